@@ -207,6 +207,26 @@ fn plain_asymmetric_and_ringed_grids_need_no_radius() {
     }
 }
 
+/// Dots whose neighbours are more than nine radii away, down to ten pixels across; where the radius is stated, and where it is not.
+#[test]
+fn small_dots_far_apart_are_found() {
+    for (keys, radius_m, turned) in [
+        ("columns = 9\nrows = 7", 0.0021, 62),
+        ("columns = 9\nrows = 7", 0.0014, 62),
+        ("columns = 4\nrows = 11\nasymmetric = true", 0.0025, 0),
+        ("columns = 4\nrows = 11\nasymmetric = true", 0.003, 0),
+    ] {
+        for stated in [grid(keys), grid(&format!("{keys}\nradius_m = {radius_m}"))] {
+            let mut print = stated.clone();
+            print.markers.iter_mut().for_each(|m| m.outer_radius_m = radius_m);
+            let turned = |id: u32| if turned > 0 { turned - id } else { id };
+            let tally = run(&stated, &print, Spoiling::None, views(), turned);
+            assert_eq!((tally.found, tally.wrong), (tally.dots, 0), "{keys} {radius_m}");
+            assert!((0.85..1.15).contains(&tally.normalised), "{keys} {radius_m} {}", tally.normalised);
+        }
+    }
+}
+
 /// Bright dots on dark ground, as on glass in reflected light: measured where the dark ones are, and said.
 #[test]
 fn bright_dots_are_measured_in_the_negative() {

@@ -18,7 +18,7 @@ use super::grid_dots::{Dot, Dots};
 use super::grid_missing::missing_dots;
 use super::grid_place::{Classes, Laid, place};
 use super::grid_seen::{Extent, Outer, Shape, View, outline};
-use super::lattice::{Cell, Lattice};
+use super::lattice::{Apart, Cell, Lattice};
 use super::neighbour_check::{Board, Placed};
 use super::pipeline::{Cut, Identified, detect_coded};
 use super::smoothed::{as_before, smoothed};
@@ -136,7 +136,7 @@ impl<'a> Grid<'a> {
 
     fn look(&self, picture: &Picture, options: &Options) -> Result<(CircleDetection, Facts)> {
         let mut facts = Facts::default();
-        let found = detect_coded(picture, options, |lattices, candidates| {
+        let found = detect_coded(picture, options, Apart::Far, |lattices, candidates| {
             let (identified, seen) = self.identify(picture, lattices, candidates)?;
             facts = seen;
             Ok(identified)

@@ -34,10 +34,32 @@ impl Site {
     }
 }
 
+/// How far apart markers may be, in semi-axes of their images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Apart {
+    /// No more than on a plate with a code.
+    Near,
+    /// As far as dots are that leave most of the paper blank.
+    Far,
+}
+
+impl Apart {
+    /// Distances within which neighbours are sought, until there are enough.
+    fn reaches(self) -> &'static [f64] {
+        match self {
+            Self::Near => &[9.0],
+            Self::Far => &[9.0, 18.0, 36.0],
+        }
+    }
+}
+
+/// Neighbours that are looked at: those of a square lattice at up to two steps.
+const NEIGHBOURS: usize = 12;
+
 /// All lattices of at least `smallest` candidates, larger ones first.
-pub(super) fn lattices(candidates: &[Candidate], smallest: usize) -> Vec<Lattice> {
+pub(super) fn lattices(candidates: &[Candidate], smallest: usize, apart: Apart) -> Vec<Lattice> {
     let index = Buckets::of(candidates);
-    let mut seeds: Vec<Seed> = (0..candidates.len()).filter_map(|i| seed(i, candidates, &index)).collect();
+    let mut seeds: Vec<Seed> = (0..candidates.len()).filter_map(|i| seed(i, candidates, &index, apart)).collect();
     seeds.sort_by(|a, b| (a.missing, a.error).partial_cmp(&(b.missing, b.error)).unwrap_or(std::cmp::Ordering::Equal));
     let mut taken = vec![false; candidates.len()];
     let mut found = Vec::new();
@@ -64,24 +86,36 @@ struct Seed {
     error: f64,
 }
 
-fn seed(i: usize, candidates: &[Candidate], index: &Buckets) -> Option<Seed> {
+/// The nearest candidates around one within `reach`, in the frame where its ellipse is the unit circle: place, distance, index.
+fn around(i: usize, candidates: &[Candidate], index: &Buckets, reach: f64) -> Vec<([f64; 2], f64, usize)> {
     let ellipse = &candidates[i].ellipse;
     let n = ellipse.normaliser();
-    let reach = 9.0 * ellipse.semi_axes()[0];
-    let mut near: Vec<([f64; 2], f64, usize)> = Vec::new();
-    index.within(ellipse.centre, reach, |j| {
+    let mut near = Vec::new();
+    index.within(ellipse.centre, reach * ellipse.semi_axes()[0], |j| {
         if j != i {
             let c = candidates[j].ellipse.centre;
             let d = [c[0] - ellipse.centre[0], c[1] - ellipse.centre[1]];
             let w = [n[0][0] * d[0] + n[0][1] * d[1], n[1][0] * d[0] + n[1][1] * d[1]];
             let length = w[0].hypot(w[1]);
-            if length < 9.0 {
+            if length < reach {
                 near.push((w, length, j));
             }
         }
     });
     near.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.cmp(&b.2)));
-    near.truncate(12);
+    near.truncate(NEIGHBOURS);
+    near
+}
+
+fn seed(i: usize, candidates: &[Candidate], index: &Buckets, apart: Apart) -> Option<Seed> {
+    let ellipse = &candidates[i].ellipse;
+    let mut near = Vec::new();
+    for reach in apart.reaches() {
+        near = around(i, candidates, index, *reach);
+        if near.len() == NEIGHBOURS {
+            break;
+        }
+    }
     let (first, length, _) = *near.first()?;
     let nearest = |target: [f64; 2]| {
         near.iter()

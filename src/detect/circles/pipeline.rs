@@ -8,7 +8,7 @@ use super::candidate::{Candidate, candidates, largest_marker};
 use super::code::{MarkerCode, Verdict};
 use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
-use super::lattice::{Buckets, Cell, Lattice, lattices};
+use super::lattice::{Apart, Buckets, Cell, Lattice, lattices};
 use super::levels::Levels;
 use super::measure::{Camera, THRESHOLD, Target, drop_target, learn, median, target_of};
 use super::neighbour_check::{Board, Placed, around, check_neighbours, continuation, neighbourhood};
@@ -41,7 +41,7 @@ pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Cir
             "give a plate of kind coded-circles with plate.csv as made by `robotcal plate`",
         )
     })?;
-    detect_coded(picture, options, |lattices, candidates| {
+    detect_coded(picture, options, Apart::Near, |lattices, candidates| {
         let (board, outcome) = identify(&code, lattices, candidates);
         Ok(Identified { plate: plate.clone(), code, board, outcome, cut: Cut::Left })
     })
@@ -70,6 +70,7 @@ pub(super) enum Cut {
 pub(super) fn detect_coded(
     picture: &Picture,
     options: &Options,
+    apart: Apart,
     identify: impl FnOnce(&[Lattice], &[Candidate]) -> Result<Identified>,
 ) -> Result<CircleDetection> {
     if picture.width < 16 || picture.height < 16 || picture.pixels.len() != picture.width * picture.height {
@@ -78,7 +79,7 @@ pub(super) fn detect_coded(
     }
     let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
     let (candidates, mut dropped) = candidates(picture, &levels, options);
-    let lattices = lattices(&candidates, SMALLEST_LATTICE);
+    let lattices = lattices(&candidates, SMALLEST_LATTICE, apart);
     let Identified { plate, code, mut board, outcome, cut } = identify(&lattices, &candidates)?;
     let mut refused = check_neighbours(&mut board, &code, &candidates);
     attach(&mut board, &code, &candidates);
@@ -101,7 +102,7 @@ fn identify(code: &MarkerCode, grown: &[Lattice], candidates: &[Candidate]) -> (
     let last = candidates.iter().map(|c| c.ellipse.centre[0]).fold(0.0, f64::max);
     let turned = |c: &Candidate| Candidate { ellipse: c.ellipse.mirrored(last), ..*c };
     let turned: Vec<Candidate> = candidates.iter().map(turned).collect();
-    match place(code, &lattices(&turned, SMALLEST_LATTICE), &turned).1 {
+    match place(code, &lattices(&turned, SMALLEST_LATTICE, Apart::Near), &turned).1 {
         Outcome::Identified { .. } => (board, Outcome::Mirrored),
         _ => (board, outcome),
     }
