@@ -12,7 +12,7 @@ use crate::files::{self, FileKind, MOST_SIDE_PX, decode_picture};
 /// Weights of red, green and blue in the grey value (luma of ITU-R BT.709), applied to the stored counts.
 pub const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
-/// Reads an image (png, tif, pgm, jpg, bmp; 8 or 16 bit, grey or colour) without reducing its depth.
+/// Reads an image (png, tif, pgm, jpg, bmp; 8 or 16 bit, grey or colour; colour tif of 32-bit floating point, too) without reducing its depth.
 ///
 /// Colour becomes grey with [`LUMA_WEIGHTS`]; an alpha channel is ignored. `bits` says how many bits of a 16-bit file
 /// are used when they sit in its low end (10 or 12 for most machine cameras), which fixes the saturation count.
@@ -78,7 +78,7 @@ fn decode_error(path: &Path, error: &ImageError) -> Error {
             Code::ImageUnreadable,
             place,
             format!("not a supported image: {e}"),
-            "convert it to png, tif, pgm, jpg or bmp",
+            "convert it to png, tif (no BigTIFF), pgm, jpg or bmp, with 8 or 16 bits a channel",
         ),
         ImageError::Limits(e) => Error::new(
             Code::ImageSizeImpossible,
@@ -135,10 +135,20 @@ fn to_picture(decoded: &DynamicImage) -> Picture {
         DynamicImage::ImageRgba16(i) => {
             (i.pixels().map(|p| luma([p.0[0], p.0[1], p.0[2]].map(f32::from))).collect(), 65535.0)
         }
-        // Floating-point TIFF: counts between 0 and 1 by convention of the decoder.
-        _ => (decoded.to_rgb32f().pixels().map(|p| 65535.0 * luma(p.0)).collect(), 65535.0),
+        // Floating-point TIFF.
+        _ => of_fractions(decoded.to_rgb32f().pixels().map(|p| luma(p.0)).collect()),
     };
     Picture { width, height, pixels, full_scale }
+}
+
+/// Values that are fractions of full scale by the convention of most programs, or counts of 8 or 16 bits as programs write that average
+/// images; with full scale.
+fn of_fractions(values: Vec<f32>) -> (Vec<f32>, f32) {
+    let peak = values.iter().copied().fold(0.0_f32, f32::max);
+    match [255.0, 65535.0].into_iter().find(|full_scale| peak <= *full_scale) {
+        _ if peak <= 1.0 => (values.iter().map(|v| 65535.0 * v).collect(), 65535.0),
+        full_scale => (values, full_scale.unwrap_or(peak)),
+    }
 }
 
 /// Grey value of a colour; exact for equal channels.

@@ -87,6 +87,25 @@ fn bits_in_the_low_end_set_the_saturation() {
     assert_says(&refused(&path, Some(40)), Code::ImageDepth, &["40"]);
 }
 
+/// As programs write the mean of several images.
+#[test]
+fn floating_point_is_read_as_fractions_or_as_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mean.tif");
+    for (brightest, full_scale, at_half) in
+        [(0.9, 65535.0, 29490.75), (200.5, 255.0, 100.25), (4000.0, 65535.0, 2000.0)]
+    {
+        let mean = ImageBuffer::from_fn(8, 8, |x, _| Rgb([if x < 4 { 0.5 } else { 1.0 } * brightest; 3]));
+        DynamicImage::ImageRgb32F(mean).save(&path).unwrap();
+        let picture = load(&path, None).unwrap();
+        assert_eq!(picture.full_scale, full_scale, "{brightest}");
+        assert!((picture.at(0, 0) - at_half).abs() < 0.01, "{brightest}: {}", picture.at(0, 0));
+    }
+    // A tif of 64-bit addresses.
+    std::fs::write(&path, b"II\x2b\0\x08\0\0\0\x10\0\0\0\0\0\0\0").unwrap();
+    assert_says(&refused(&path, None), Code::ImageUnreadable, &["BigTIFF"]);
+}
+
 #[test]
 fn broken_files_are_named() {
     let folder = tempfile::tempdir().unwrap();
