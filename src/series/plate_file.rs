@@ -10,7 +10,8 @@ use super::plate::{Aruco, Marker, Plate, ScaleBar};
 use super::plate_kind::{Ink, Places, PlateKind};
 use super::puzzle::Puzzle;
 use super::table::{Row, Table, to_csv};
-use super::tag_plates::{TagKeys, plate_of};
+use super::tag_plates::{TagKeys, dictionary_of, plate_of};
+use super::tags::dictionary_named;
 use super::toml_file::{check_format, parse_toml, read_toml, require_positive, to_toml};
 use crate::error::{Code, Error, Result};
 use crate::files::FileKind;
@@ -111,6 +112,7 @@ fn parse(path: &Path, toml: &str, marker_text: impl FnOnce(&Path) -> Result<Stri
     for (key, value) in lengths {
         require_positive(path, key, value)?;
     }
+    check_dictionary(path, toml, &file)?;
     let mut plate = nominal(path, &file)?;
     if let Some(markers) = &file.markers {
         let csv = path.with_file_name(markers);
@@ -122,6 +124,20 @@ fn parse(path: &Path, toml: &str, marker_text: impl FnOnce(&Path) -> Result<Stri
     check_overlap(path, &plate)?;
     check_scale(path, &plate)?;
     Ok(plate)
+}
+
+/// The dictionary is known, by whichever key it is stated.
+fn check_dictionary(path: &Path, toml: &str, file: &PlateFile) -> Result<()> {
+    let of_family = file.family.as_deref().map(dictionary_of);
+    let in_table = file.aruco.as_ref().map(|aruco| aruco.dictionary.clone());
+    let stated = [("dictionary", file.dictionary.clone()), ("family", of_family), ("dictionary", in_table)];
+    for (key, name) in stated.into_iter().filter_map(|(key, name)| Some((key, name?))) {
+        // A key in a table within a line stands behind others.
+        let line = toml.lines().position(|line| line.split('#').next().is_some_and(|l| l.contains(key)));
+        let place = line.map_or_else(|| path.display().to_string(), |l| format!("{}:{}", path.display(), l + 1));
+        dictionary_named(&name, &place)?;
+    }
+    Ok(())
 }
 
 /// The marker file that a plate names.

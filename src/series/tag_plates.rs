@@ -173,9 +173,10 @@ impl TagKeys {
 }
 
 /// OpenCV's name of a family: `36h11`, `t36h11` and `tag36h11` are all used.
-fn dictionary_of(family: &str) -> String {
-    let bare = family.trim_start_matches("DICT_APRILTAG_").trim_start_matches("tag").trim_start_matches('t');
-    format!("DICT_APRILTAG_{}", bare.replace('H', "h"))
+pub(super) fn dictionary_of(family: &str) -> String {
+    let lower = family.to_ascii_lowercase();
+    let bare = lower.trim_start_matches("dict_apriltag_").trim_start_matches("tag").trim_start_matches('t');
+    format!("DICT_APRILTAG_{bare}")
 }
 
 #[cfg(test)]

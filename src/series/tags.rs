@@ -11,10 +11,11 @@
 //!
 //! Kalibr's AprilGrid also has a dark square at every corner between tags, as wide as the gap.
 
-use calib_targets_aruco::{Dictionary, resolve_dictionary};
+use calib_targets_aruco::Dictionary;
+use calib_targets_aruco::builtins::{BUILTIN_DICTIONARY_NAMES, builtin_dictionary};
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, closest_name};
 
 /// How a tag is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,14 +64,7 @@ impl Tags {
     /// # Errors
     /// A name that is not known; fewer tags in it than `count` from the first on.
     pub fn dictionary(&self, place: &str, count: u32) -> Result<Dictionary> {
-        let found = resolve_dictionary(&self.dictionary).ok_or_else(|| {
-            Error::new(
-                Code::DictionaryUnknown,
-                place,
-                format!("the dictionary {:?} is not known", self.dictionary),
-                "use a name of OpenCV, such as DICT_4X4_50 or DICT_APRILTAG_36h11, or a family such as 36h11",
-            )
-        })?;
+        let found = dictionary_named(&self.dictionary, place)?;
         let last = u64::from(self.first_id) + u64::from(count);
         if last > found.codes().len() as u64 {
             let what = format!("{} has {} tags, but {last} are needed", found.name(), found.codes().len());
@@ -141,6 +135,24 @@ impl Tags {
         }
         region
     }
+}
+
+/// A dictionary by its name in OpenCV, in letters of either case, with or without `DICT_`.
+///
+/// # Errors
+/// A name that is not known.
+pub fn dictionary_named(name: &str, place: &str) -> Result<Dictionary> {
+    let bare = |name: &str| name.to_ascii_uppercase().trim_start_matches("DICT_").to_owned();
+    let meant = BUILTIN_DICTIONARY_NAMES.iter().find(|known| bare(known) == bare(name));
+    meant.and_then(|known| builtin_dictionary(known)).ok_or_else(|| {
+        let remedy = match closest_name(name, BUILTIN_DICTIONARY_NAMES.iter().copied()) {
+            Some(close) => format!("is \"{close}\" meant?"),
+            None => {
+                "use a name of OpenCV, such as DICT_4X4_50 or DICT_APRILTAG_36h11, or a family such as 36h11".to_owned()
+            }
+        };
+        Error::new(Code::DictionaryUnknown, place, format!("the dictionary {name:?} is not known"), remedy)
+    })
 }
 
 pub(super) fn square([x, y]: [f64; 2], half: f64) -> Vec<[f64; 2]> {
