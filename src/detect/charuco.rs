@@ -3,11 +3,10 @@
 //! The `calib-targets` library decodes the markers and so tells which corner is which; the positions are measured as on
 //! a plain chessboard, from the pixels along the edges that the markers leave free.
 
-use calib_targets_aruco::MarkerDetection;
 use calib_targets_chessboard::detect_corners;
 
 use super::board_labels::{BoardSize, Lattice, Placement};
-use super::charuco_markers::{Print, decode, prints};
+use super::charuco_markers::{Marker, Print, decode, prints};
 use super::charuco_seen::{Seen, instead};
 use super::chessboard::{Bytes, WINDOW, board_size, corner_config};
 use super::corners::{Window, measure};
@@ -22,6 +21,8 @@ const KEEP_OFF_PX: f64 = 2.0;
 const LEAST_MARKERS: usize = 4;
 /// Markers of the last row that prove a row below it.
 const FURTHER_MARKERS: usize = 2;
+/// Corners that are on no board of the other layout and prove this one.
+const FURTHER_CORNERS: usize = 2;
 /// Wrong bits of a marker that proves where the board lies.
 const SURE_BITS: u8 = 1;
 
@@ -40,19 +41,25 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let least = if plate.aruco.is_some() { 1 } else { LEAST_MARKERS };
     let at_scale = |bytes: &Bytes, scale: f64| at_scale(bytes, scale, &prints, board, least);
     let found = best_of_sizes(&bytes, board, |found: &Found| &found.lattice, |scale| at_scale(&bytes, scale))?;
-    let Some(Found { print, lattice, is_sure, has_further_row, .. }) = found else {
+    let Some(found) = found else {
         bytes.mirror();
         if at_scale(&bytes, 1.0)?.is_some() {
             return Err(mirrored_board());
         }
         return Err(instead(picture, plate).map_or_else(|| no_board(plate), |seen| other_board(plate, &seen)));
     };
-    if plate.aruco.is_some() && prints.first().is_some_and(|stated| stated.legacy != print.legacy) {
-        return Err(other_layout(print.legacy));
+    let is_sure = found.is_sure(board);
+    if plate.aruco.is_some() && prints.first().is_some_and(|stated| stated.legacy != found.print.legacy) {
+        let error = other_layout(found.print.legacy);
+        return if found.tells_layout() { Ok(Detection::other_size(error)) } else { Err(error) };
     }
-    if has_further_row {
+    if plate.aruco.is_none() && found.rival.is_some_and(|rival| rival >= found.explains()) {
+        return Err(either_layout());
+    }
+    if found.has_further_row && is_sure {
         return Ok(Detection::beyond(more_rows(plate)));
     }
+    let Found { print, lattice, .. } = found;
     let window = Window { arm: 0.5 * (1.0 - print.ratio), keep_off_px: KEEP_OFF_PX, ..WINDOW };
     let mut detection = measure(picture, &lattice, Placement::on_board(board, print.legacy), window);
     if detection.outline == Outline::LineMissing && is_sure {
@@ -69,29 +76,40 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     Ok(detection)
 }
 
-/// Column and row of an inner corner; a legacy board is sought as one with a further row above it, whose corners are none.
-fn position_on_board(id: u32, board: BoardSize, legacy: bool) -> Option<(i32, i32)> {
-    let id = i32::try_from(id).unwrap_or(i32::MAX);
-    let row = id / board.columns - i32::from(legacy);
-    (row >= 0).then_some((id % board.columns, row))
-}
-
 /// What was found at one of the sizes.
 struct Found {
     print: Print,
     markers: usize,
     /// Corners of the board in px of the picture.
     lattice: Lattice,
-    /// Whether the markers alone say which corner is which, wherever the board seems to end.
-    is_sure: bool,
+    /// Whether the markers alone say which corner is which on a board of this layout, wherever it seems to end.
+    has_place: bool,
     /// Whether the board goes on below its last row.
     has_further_row: bool,
+    /// What the other layout explains, where markers fit into it.
+    rival: Option<(usize, usize)>,
 }
 
 impl Found {
     /// Markers that were read, then corners that are on the board: in the other layout most markers agree, moved by a column.
     fn explains(&self) -> (usize, usize) {
         (self.markers, self.lattice.len())
+    }
+
+    /// Whether the markers alone say which corner is which. On a board with an odd number of squares in a row they fit into both layouts,
+    /// moved by a column: where one of these is not seen at all, the other may be the moved one.
+    fn is_sure(&self, board: BoardSize) -> bool {
+        let told = match self.rival {
+            Some((markers, _)) => markers < self.markers,
+            None => board.rows % 2 == 0 || board.columns % 2 == 1,
+        };
+        self.has_place && told
+    }
+
+    /// Whether markers or corners are seen that are on no board of the other layout.
+    fn tells_layout(&self) -> bool {
+        let (markers, corners) = self.rival.unwrap_or_default();
+        self.has_place && (self.markers > markers || self.lattice.len() >= corners + FURTHER_CORNERS)
     }
 }
 
@@ -100,52 +118,39 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
     let scaled = bytes.scaled(scale);
     let corners = detect_corners(&scaled.view(), &corner_config());
     let mut best: Option<Found> = None;
-    let mut others: Vec<(bool, usize)> = Vec::new();
+    let mut all: Vec<(bool, (usize, usize))> = Vec::new();
     for print in prints {
         let Some(found) = decode(&scaled.view(), &corners, print, board)? else { continue };
         let markers = found.markers.len();
         if markers < least {
             continue;
         }
-        let place = |x: f32, y: f32| [x, y].map(|c| on_picture(c, scale));
-        let on_board = |id| position_on_board(id, board, print.legacy);
-        let corners = found.corners.iter();
-        let lattice: Lattice =
-            corners.filter_map(|c| Some((on_board(c.id)?, place(c.position.x, c.position.y)))).collect();
-        let is_sure = are_sure(&found.markers, board);
-        let has_further_row = has_further_row(&found.markers, board, print.legacy);
-        others.push((print.legacy, markers));
-        let found = Found { print: *print, markers, lattice, is_sure, has_further_row };
+        let place = |[x, y]: [f32; 2]| [x, y].map(|c| on_picture(c, scale));
+        let lattice: Lattice = found.corners.iter().map(|(at, px)| (*at, place(*px))).collect();
+        let has_place = have_place(&found.markers);
+        let has_further_row = has_further_row(&found.markers, board);
+        let found = Found { print: *print, markers, lattice, has_place, has_further_row, rival: None };
+        all.push((print.legacy, found.explains()));
         if best.as_ref().is_none_or(|other| other.explains() < found.explains()) {
             best = Some(found);
         }
     }
     if let Some(best) = &mut best {
-        // The markers of a part of the board may fit into the other layout as well, moved by a column.
-        best.is_sure &= others.iter().all(|(legacy, markers)| *legacy == best.print.legacy || *markers < best.markers);
-        best.has_further_row &= best.is_sure;
+        let rivals = all.iter().filter(|(legacy, _)| *legacy != best.print.legacy);
+        best.rival = rivals.map(|(_, explains)| *explains).max();
     }
     Ok(best)
 }
 
-/// Row of squares in which a marker lies, by its number.
-fn row_of(id: u32, board: BoardSize) -> u32 {
-    let squares = board.columns.unsigned_abs() + 1;
-    // The first row has one fewer, where they are odd.
-    2 * (id / squares) + u32::from(id % squares >= squares / 2)
-}
-
 /// Whether markers of the last row of squares are read: that takes the corners below them, and at the end of a board there are none.
-fn has_further_row(markers: &[MarkerDetection], board: BoardSize, legacy: bool) -> bool {
-    let last = board.rows.unsigned_abs() + u32::from(legacy);
-    let is_last = |m: &&MarkerDetection| m.hamming <= SURE_BITS && row_of(m.id, board) == last;
-    markers.iter().filter(is_last).count() >= FURTHER_MARKERS
+fn has_further_row(markers: &[Marker], board: BoardSize) -> bool {
+    markers.iter().filter(|m| m.wrong_bits <= SURE_BITS && m.row == board.rows).count() >= FURTHER_MARKERS
 }
 
-/// Whether enough markers, in more than one row, say where the board lies: with twenty cells of 4 x 4 bits, one such place in 50 million boards
+/// Whether enough markers, in more than one row, say where a board of their layout lies: with twenty cells of 4 x 4 bits, one such place in 50 million boards
 /// is there by chance.
-fn are_sure(markers: &[MarkerDetection], board: BoardSize) -> bool {
-    let rows: Vec<u32> = markers.iter().filter(|m| m.hamming <= SURE_BITS).map(|m| row_of(m.id, board)).collect();
+fn have_place(markers: &[Marker]) -> bool {
+    let rows: Vec<i32> = markers.iter().filter(|m| m.wrong_bits <= SURE_BITS).map(|m| m.row).collect();
     rows.len() >= LEAST_MARKERS && rows.iter().any(|r| *r != rows[0])
 }
 
@@ -227,6 +232,13 @@ fn other_layout(legacy: bool) -> Error {
         ),
     };
     Error::new(Code::PlateNotDetectable, "image", what, remedy)
+}
+
+fn either_layout() -> Error {
+    let what =
+        "the markers in view fit into both of OpenCV's layouts, a column apart: which corner is which cannot be told";
+    let remedy = "write dictionary, side_m and legacy (true for the layout before 4.6) under [aruco] in the plate file";
+    Error::new(Code::PlateIncomplete, "image", what, remedy)
 }
 
 fn mirrored_board() -> Error {

@@ -1,20 +1,18 @@
 //! Markers of a ChArUco board, read by the `calib-targets` library with one print after the other.
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
-use calib_targets_aruco::{Dictionary, resolve_dictionary};
-use calib_targets_charuco::{
-    CharucoAdvancedTuning, CharucoBoardSpec, CharucoDetection, CharucoDetector, CharucoParams,
-};
+use calib_targets_aruco::{Dictionary, MarkerDetection, rotate_code_u64};
+use calib_targets_charuco::{CharucoAdvancedTuning, CharucoBoardSpec, CharucoDetector, CharucoParams};
 use calib_targets_chessboard::ChessCorner;
-use calib_targets_core::GrayImageView;
+use calib_targets_core::{Coord, GrayImageView};
 
 use super::board_labels::BoardSize;
 use super::chessboard::corner_config;
 use super::tag_scan::usual_dictionaries;
 use crate::error::{Code, Error, Result};
-use crate::series::Plate;
+use crate::series::{Plate, dictionary_named};
 
 /// Sides of a marker over that of a square that are tried where the plate does not state it.
 const USUAL_RATIOS: [f64; 5] = [0.75, 0.8, 0.7, 0.6, 0.5];
@@ -29,20 +27,34 @@ pub(super) struct Print {
     pub legacy: bool,
 }
 
-/// The board with the ids of its corners and markers; `None` where none of this print is seen.
+/// What is seen of a board of one print.
+pub(super) struct Decoded {
+    /// Columns and rows of inner corners, with their places in the picture.
+    pub corners: Vec<((i32, i32), [f32; 2])>,
+    pub markers: Vec<Marker>,
+}
+
+/// A marker in the place where the print has it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Marker {
+    /// Row of squares.
+    pub row: i32,
+    /// Bits that were read otherwise.
+    pub wrong_bits: u8,
+}
+
+/// The board in the picture; `None` where none of this print is seen.
 pub(super) fn decode(
     view: &GrayImageView<'_>,
     corners: &[ChessCorner],
     print: &Print,
     board: BoardSize,
-) -> Result<Option<CharucoDetection>> {
+) -> Result<Option<Decoded>> {
     let [rows, columns] = [board.rows + 1, board.columns + 1].map(i32::unsigned_abs);
-    let (rows, dictionary) = match print.legacy {
-        false => (rows, print.dictionary),
-        true => match behind_a_row(print.dictionary, columns as usize / 2) {
-            Some(dictionary) => (rows + 1, dictionary),
-            None => return Ok(None),
-        },
+    let ([rows, columns], dictionary) = match print.legacy {
+        false => ([rows, columns], print.dictionary),
+        // With too few codes no board is possible either way.
+        true => ([columns, rows], turned(print.dictionary, [columns, rows]).unwrap_or(print.dictionary)),
     };
     let spec = CharucoBoardSpec::new(rows, columns, 1.0, print.ratio as f32, dictionary);
     let mut params = CharucoParams::for_board(spec);
@@ -52,36 +64,49 @@ pub(super) fn decode(
     tuning.grid_smoothness_threshold_rel = f32::INFINITY;
     tuning.corner_validation_threshold_rel = f32::INFINITY;
     let params = params.with_advanced(tuning);
-    let detector = match CharucoDetector::new(params) {
-        Ok(detector) => detector,
-        // The row that is not printed takes more markers than the dictionary has.
-        Err(_) if print.legacy => return Ok(None),
-        Err(e) => {
-            let what = format!("the ChArUco board is impossible: {e}");
-            let remedy = "check `columns`, `rows` (inner corners) and [aruco] of the plate file";
-            return Err(Error::new(Code::PlateNotDetectable, "plate", what, remedy));
-        }
+    let detector = CharucoDetector::new(params).map_err(|e| {
+        let what = format!("the ChArUco board is impossible: {e}");
+        let remedy = "check `columns`, `rows` (inner corners) and [aruco] of the plate file";
+        Error::new(Code::PlateNotDetectable, "plate", what, remedy)
+    })?;
+    let Ok(found) = detector.detect_with_corners(view, corners) else { return Ok(None) };
+    // Its corners are counted from 1, its squares from 0.
+    let corner = |at: Coord| if print.legacy { (at.v - 1, board.rows - at.u) } else { (at.u - 1, at.v - 1) };
+    let marker = |m: &MarkerDetection| {
+        let at = detector.board().marker_position(m.id)?;
+        Some(Marker { row: if print.legacy { board.rows - at.u } else { at.v }, wrong_bits: m.hamming })
     };
-    Ok(detector.detect_with_corners(view, corners).ok())
+    Ok(Some(Decoded {
+        corners: found.corners.iter().map(|c| (corner(c.grid), [c.position.x, c.position.y])).collect(),
+        markers: found.markers.iter().filter_map(marker).collect(),
+    }))
 }
 
-/// Dictionaries of [`behind_a_row`]: the library wants their codes to live for ever, so each is made once.
-static SHIFTED: Mutex<BTreeMap<(&'static str, usize), Dictionary>> = Mutex::new(BTreeMap::new());
+/// Dictionaries of [`turned`]: the library wants their codes to live for ever, so each is made once.
+static TURNED: Mutex<BTreeMap<(&'static str, [u32; 2]), Dictionary>> = Mutex::new(BTreeMap::new());
 
-/// The dictionary with its numbers `by` higher: with a row of `by` markers above it that is not printed, a legacy board is one of the
-/// present layout. Its last codes, which stand for that row, are on no board that has enough.
-fn behind_a_row(dictionary: Dictionary, by: usize) -> Option<Dictionary> {
-    let mut made = SHIFTED.lock().ok()?;
-    if let Some(known) = made.get(&(dictionary.name(), by)) {
+/// The dictionary with which a legacy board of so many columns and rows of squares (the rows even) is one of the present layout: after a
+/// quarter turn to the right its first square is dark. The codes stand in the order of that layout, turned with the board, and those that are
+/// not on it follow; `None` where there are too few.
+fn turned(dictionary: Dictionary, [columns, rows]: [u32; 2]) -> Option<Dictionary> {
+    let mut made = TURNED.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = (dictionary.name(), [columns, rows]);
+    if let Some(known) = made.get(&key) {
         return Some(*known);
     }
+    let squares = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+    let light = squares.filter(|(row, column)| (row + column) % 2 == 0);
+    let mut places: Vec<(u32, u32, usize)> =
+        light.zip(0..).map(|((row, column), id)| (column, rows - 1 - row, id)).collect();
+    places.sort_unstable();
     let codes = dictionary.codes();
-    let (first, last) = codes.split_at_checked(codes.len().checked_sub(by)?)?;
-    let codes = [last, first].concat().leak();
+    let on_board: Option<Vec<u64>> =
+        places.iter().map(|(_, _, id)| Some(rotate_code_u64(*codes.get(*id)?, dictionary.marker_size(), 1))).collect();
+    let codes = [&on_board?, codes.get(places.len()..)?].concat().leak();
     let (size, bits) = (dictionary.marker_size(), dictionary.max_correction_bits());
-    let shifted = Dictionary::from_static_codes(dictionary.name(), size, bits, codes).ok()?;
-    made.insert((dictionary.name(), by), shifted);
-    Some(shifted)
+    let turned = Dictionary::from_static_codes(dictionary.name(), size, bits, codes).ok()?;
+    made.insert(key, turned);
+    Some(turned)
 }
 
 /// The first layouts of a plate's markers: with an odd number of rows of squares both are the same.
@@ -94,14 +119,7 @@ fn layouts(plate: &Plate, legacy: bool) -> impl Iterator<Item = bool> + Clone + 
 /// What is printed according to the plate and in the other layout, or all that OpenCV prints.
 pub(super) fn prints(plate: &Plate) -> Result<Vec<Print>> {
     let Some(aruco) = &plate.aruco else { return Ok(usual_prints(plate)) };
-    let dictionary = resolve_dictionary(&aruco.dictionary).ok_or_else(|| {
-        Error::new(
-            Code::DictionaryUnknown,
-            "plate",
-            format!("the dictionary {:?} is not known", aruco.dictionary),
-            "use a name of OpenCV, such as DICT_4X4_50 or DICT_APRILTAG_36h11",
-        )
-    })?;
+    let dictionary = dictionary_named(&aruco.dictionary, "plate")?;
     let ratio = aruco.side_m / plate.pitch_m;
     Ok(layouts(plate, aruco.legacy).map(|legacy| Print { dictionary, ratio, legacy }).collect())
 }

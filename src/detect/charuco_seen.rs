@@ -1,13 +1,13 @@
 //! Which ChArUco board is in a picture that does not show the one of the plate file.
 
-use calib_targets_aruco::{Dictionary, resolve_dictionary};
+use calib_targets_aruco::Dictionary;
 
 use super::Picture;
 use super::quads::Quad;
 use super::tag_code::Reader;
 use super::tag_layout::Layout;
 use super::tag_scan::{corners, passes, scan, usual_dictionaries};
-use crate::series::{Plate, TagPrint, Tags};
+use crate::series::{Plate, TagPrint, Tags, dictionary_named};
 
 /// Pairs of markers two squares apart that must agree on the numbers.
 const LEAST_PAIRS: usize = 4;
@@ -53,8 +53,7 @@ impl Seen {
 
     /// Whether the plate file states another dictionary, or none.
     pub fn dictionary_differs(&self, plate: &Plate) -> bool {
-        let stated = plate.aruco.as_ref().and_then(|aruco| resolve_dictionary(&aruco.dictionary));
-        stated.is_none_or(|stated| stated.name() != self.dictionary)
+        stated(plate).is_none_or(|stated| stated.name() != self.dictionary)
     }
 
     /// Whether the plate file states another side.
@@ -64,11 +63,16 @@ impl Seen {
     }
 }
 
+/// The dictionary of the plate file.
+fn stated(plate: &Plate) -> Option<Dictionary> {
+    dictionary_named(&plate.aruco.as_ref()?.dictionary, "plate").ok()
+}
+
 /// The board that most markers agree with, where it is another one.
 pub(super) fn instead(picture: &Picture, plate: &Plate) -> Option<Seen> {
     let passes: Vec<Vec<Quad>> = passes(picture).collect();
-    let stated = plate.aruco.as_ref().and_then(|aruco| resolve_dictionary(&aruco.dictionary));
-    let all = stated.into_iter().chain(usual_dictionaries()).map(|dictionary| Seen::of(picture, &passes, dictionary));
+    let all =
+        stated(plate).into_iter().chain(usual_dictionaries()).map(|dictionary| Seen::of(picture, &passes, dictionary));
     // The first of equals.
     let best = all.reduce(|best, other| if other.pairs > best.pairs { other } else { best })?;
     (best.pairs >= LEAST_PAIRS && !best.is(plate)).then_some(best)

@@ -24,7 +24,7 @@ pub struct Detection {
 }
 
 impl Detection {
-    /// A board without a code that is not as large as the plate says.
+    /// A board that is not as large as the plate says, or whose markers stand in another layout.
     pub(super) fn other_size(error: Error) -> Self {
         Self { failure: Some(error), outline: Outline::OtherSize, ..Self::default() }
     }
@@ -56,7 +56,7 @@ pub enum Outline {
     LineMissing,
     /// The same of tags, or of corners beside tags, whose numbers tell their places all the same.
     TagsMissing,
-    /// A board without a code ends in view, and not where the plate says.
+    /// A board without a code ends in view, and not where the plate says; or one with markers has another layout.
     OtherSize,
     /// Markers with a code are seen where there should be none: the board is larger than the plate says.
     Beyond,

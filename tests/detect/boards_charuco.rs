@@ -1,12 +1,16 @@
 //! ChArUco boards and plain grids of dots on rendered pictures with known truth.
 
+use std::path::{Path, PathBuf};
+
 use crate::boards_scene::{Print, Scene, View};
 use crate::said::assert_says;
-use calib_targets_aruco::builtins::DICT_4X4_50;
+use calib_targets_aruco::builtins::{
+    DICT_4X4_50, DICT_5X5_50, DICT_APRILTAG_16h5, DICT_APRILTAG_25h9, DICT_APRILTAG_36h10,
+};
 use nalgebra::Vector3;
 use robotcal::Code;
-use robotcal::detect::{Detection, Picture, detect};
-use robotcal::series::{Aruco, Edge, Plate, PlateKind};
+use robotcal::detect::{Detection, Picture, detect, detect_series};
+use robotcal::series::{Aruco, Edge, Plate, PlateKind, parse_plate};
 
 const COLUMNS: u32 = 8;
 const ROWS: u32 = 5;
@@ -97,6 +101,91 @@ fn a_board_of_the_layout_before_opencv_4_6_keeps_its_ids() {
         assert!(rms(&errors(&guessed, |id| new.corner(id))) < 0.006, "{columns}");
         assert_says(&guessed.notices[0], Code::DictionaryGuessed, &["4.6"]);
     }
+}
+
+/// Boards that need most or all of their dictionary, in both layouts, of odd and even numbers of squares; with odd rows both are the same.
+#[test]
+fn a_board_that_uses_up_its_dictionary_is_found_in_either_layout() {
+    for (dictionary, columns, rows, square) in [
+        (DICT_APRILTAG_16h5, 8, 5, 46.0),
+        (DICT_APRILTAG_16h5, 9, 5, 46.0),
+        (DICT_APRILTAG_25h9, 10, 5, 46.0),
+        (DICT_4X4_50, 11, 7, 44.0),
+        (DICT_4X4_50, 9, 9, 40.0),
+        (DICT_5X5_50, 11, 7, 44.0),
+        (DICT_4X4_50, 8, 4, 46.0),
+        (DICT_4X4_50, 7, 4, 46.0),
+    ] {
+        let view = View::new(columns, rows, [321.3, 239.6], square, 0.05, [0.005, -0.003]);
+        let plate = |legacy| Plate {
+            aruco: Some(Aruco { dictionary: dictionary.name().to_owned(), side_m: 0.007, legacy }),
+            ..Plate::lattice(PlateKind::Charuco, columns, rows, 0.01, 1e-4)
+        };
+        for legacy in [false, true] {
+            let has_layouts = rows % 2 == 1;
+            let print = Print::Charuco { dictionary, ratio: 0.7, legacy: legacy && has_layouts };
+            let scene = Scene { print, ..Scene::new(columns, rows, view) };
+            let picture = scene.render(0);
+            let what = format!("{} {columns} x {rows}, legacy {legacy}", dictionary.name());
+            let found = detect(&picture, &plate(legacy)).unwrap_or_else(|e| panic!("{what}: {e}"));
+            assert_eq!(found.observations.len() as u32, columns * rows, "{what}: {:?}", found.dropped);
+            let error = rms(&errors(&found, |id| scene.corner(id)));
+            assert!(error < 0.006, "{what}: {error}");
+            if has_layouts {
+                let other = detect(&picture, &plate(!legacy)).expect_err(&what);
+                assert_says(&other, Code::PlateNotDetectable, &["4.6"]);
+            }
+        }
+    }
+}
+
+/// A view that no outer line reaches fits into both layouts, a column apart: another image tells that the stated one is wrong.
+#[test]
+fn no_image_keeps_ids_of_a_layout_that_another_image_contradicts() {
+    let of = |view, legacy| {
+        let print = Print::Charuco { dictionary: DICT_4X4_50, ratio: 0.7, legacy };
+        Scene { print, ..Scene::new(COLUMNS, ROWS, view) }
+    };
+    let whole = View::new(COLUMNS, ROWS, [321.3, 239.6], 46.0, 0.2, [0.015, -0.01]);
+    let part = View::new(COLUMNS, ROWS, [321.3, 239.6], 122.0, 0.02, [0.003, -0.002]);
+    let paths = ["whole.png", "part.png"].map(PathBuf::from);
+    for legacy in [false, true] {
+        let pictures = [of(whole, legacy), of(part, legacy)].map(|scene| scene.render(0));
+        let seen = |aruco: Option<bool>| {
+            let aruco = aruco.map(|legacy| Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy });
+            let plate = Plate { aruco, ..charuco_plate(None) };
+            let picture = |path: &Path| Ok(pictures[usize::from(path == paths[1])].clone());
+            detect_series(&paths, &plate, picture, |_| {}).into_iter().map(|image| image.detection).collect::<Vec<_>>()
+        };
+        let right = seen(Some(legacy));
+        for (image, view) in right.iter().zip([whole, part]) {
+            assert!(image.observations.len() >= 8, "{:?}", image.failure);
+            let error = rms(&errors(image, |id| of(view, legacy).corner(id)));
+            assert!(error < 0.01, "{error}");
+        }
+        let codes = |of: &[Detection]| of.iter().map(|i| i.failure.as_ref().map(|f| f.code)).collect::<Vec<_>>();
+        assert_eq!(codes(&seen(Some(!legacy))), [Some(Code::PlateNotDetectable); 2], "legacy {legacy}");
+        assert_eq!(codes(&seen(None)), [None, Some(Code::PlateIncomplete)], "legacy {legacy}, unstated");
+    }
+}
+
+#[test]
+fn a_dictionary_is_known_in_letters_of_either_case_and_an_unknown_one_has_its_line() {
+    let read = |name: &str| {
+        let text = format!(
+            "format = 1\nkind = \"charuco\"\ncolumns = 8\nrows = 5\npitch_m = 0.01\nmarker_m = 0.007\n{name}\n"
+        );
+        parse_plate(Path::new("plate.toml"), &text, "")
+    };
+    let print = Print::Charuco { dictionary: DICT_APRILTAG_36h10, ratio: 0.7, legacy: false };
+    let picture = Scene { print, ..charuco_scene(0.1) }.render(0);
+    for name in ["DICT_APRILTAG_36H10", "DICT_APRILTAG_36h10", "apriltag_36h10"] {
+        let plate = read(&format!("dictionary = \"{name}\"")).unwrap();
+        assert_eq!(detect(&picture, &plate).unwrap().observations.len(), 40, "{name}");
+    }
+    let error = read("dictionary = \"DICT_APRILTG_36h10\"").expect_err("no such dictionary");
+    assert_says(&error, Code::DictionaryUnknown, &["DICT_APRILTAG_36h10"]);
+    assert_eq!(error.place, "plate.toml:7");
 }
 
 #[test]
