@@ -134,6 +134,41 @@ fn a_plate_and_a_camera_that_creep_are_not_called_moved_once() {
     }
 }
 
+/// Half a milliradian over the series: a step in the middle of it explains three quarters, and either half would still creep.
+#[test]
+fn a_zero_that_creeps_is_not_called_mastered_anew() {
+    const MOST_RAD: f64 = 0.5e-3;
+    for (seed, joint) in [(11, 1), (12, 3)] {
+        let chain = chain();
+        let mut series = measured(&seen(CameraMount::Hand, 30, seed), &chain);
+        for (k, stop) in series.stops.iter_mut().enumerate() {
+            stop.readings.as_mut().unwrap()[joint] -= MOST_RAD * k as f64 / 29.0;
+        }
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        let solution = identify(chain.clone(), &[series], &options).unwrap();
+        let zeros = solution.findings.iter().filter_map(|f| if let Finding::ZeroMoved(z) = f { Some(z) } else { None });
+        let [found] = zeros.collect::<Vec<_>>()[..] else { panic!("{:?}", solution.findings) };
+        assert_eq!((&found.joint, found.displacement), (&chain.readings[joint], Displacement::AllThrough), "{found:?}");
+        assert!((found.offset.0 - MOST_RAD).abs() < 5.0 * found.offset.1 && found.offset.1 < 0.2e-3, "{found:?}");
+    }
+}
+
+/// Observations that state a noise of a pixel leave a pixel and more: no camera that does not fit.
+#[test]
+fn stated_noise_is_no_misfit_of_the_camera() {
+    let plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.03e-3);
+    let request = WorldRequest {
+        images: 24,
+        least_markers: 12,
+        seed: 13,
+        pixel_sigma_px: 1.0,
+        ..WorldRequest::typical(chain(), plate)
+    };
+    let solution = solved(&series(&request).unwrap());
+    let misfit = solution.findings.iter().find(|f| f.code() == Code::CameraModelMisfit);
+    assert!(solution.free_poses.rms_px > 1.0 && misfit.is_none(), "{:?}", solution.findings);
+}
+
 #[test]
 fn what_creeps_by_little_is_a_doubt() {
     let far = |k: usize| 0.1e-3 * k as f64 / 23.0;
