@@ -25,7 +25,7 @@ use crate::error::Result;
 use crate::geom::Pose;
 use crate::identify::{Options, Solution, beside_two_stages, identify};
 use crate::model::robot::Robot;
-use crate::output::{self, Context, Offsets, Poses, ResultFolder, solution_json};
+use crate::output::{self, Context, NewResult, Offsets, Poses, ResultFolder, solution_json};
 use crate::series::{InputFile, RecordingOptions};
 use crate::stage::stage;
 use crate::urdf::RobotDescription;
@@ -113,16 +113,26 @@ impl Calibration {
     /// # Errors
     /// As of [`output::files`].
     pub fn files(&self, export: &Export) -> Result<BTreeMap<String, Vec<u8>>> {
-        let _stage = stage("files");
         output::files(&self.solution, &self.context(export))
+    }
+
+    /// Writes the files of the result one after the other, so that only one of them is in memory.
+    ///
+    /// # Errors
+    /// As of [`output::each_file`]; a file that cannot be written.
+    pub fn write(&self, export: &Export, result: &NewResult) -> Result<()> {
+        let _stage = stage("files");
+        output::each_file(&self.solution, &self.context(export), &mut |name, bytes| result.put(name, &bytes))
     }
 
     /// Writes the result into a folder, replacing an earlier one as a whole.
     ///
     /// # Errors
-    /// As of [`Calibration::files`] and [`output::write_all`].
+    /// As of [`Calibration::write`] and [`output::write_all`].
     pub fn save(&self, folder: impl AsRef<Path>) -> Result<()> {
-        ResultFolder::claim(folder.as_ref(), solution_json::FILE_NAME)?.write_all(&self.files(&Export::default())?)
+        let result = ResultFolder::claim(folder.as_ref(), solution_json::FILE_NAME)?.begin()?;
+        self.write(&Export::default(), &result)?;
+        result.finish()
     }
 
     /// The report, a self-contained page.

@@ -13,8 +13,9 @@ use super::show::read_solution;
 use super::{Verdict, long_table, progress, stages, summary};
 use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
 use crate::error::{Code, Error, Result};
+use crate::files::{self, FileKind};
 use crate::identify::{Estimator, Options, dry_run};
-use crate::output::solution_json::{self, FILE_NAME, TIMINGS};
+use crate::output::solution_json::{FILE_NAME, TIMINGS};
 use crate::output::{Offsets, Poses, ResultFolder, folder_name, restore};
 
 /// Flags of `identify`.
@@ -149,26 +150,28 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     // A refusal says nothing of what was noticed before, which may be its cause.
     let calibration = Calibration::of(observed, &Options { estimator, ..options })
         .inspect_err(|_| noticed.iter().for_each(|notice| tracing::warn!("{}", notice.coded())))?;
-    write(args, &calibration, place)
+    write(args, calibration, place)
 }
 
-fn write(args: &IdentifyArgs, calibration: &Calibration, place: ResultFolder) -> Result<Verdict> {
+fn write(args: &IdentifyArgs, calibration: Calibration, place: ResultFolder) -> Result<Verdict> {
     let poses = if args.poses { Poses::Written } else { Poses::LeftOut };
     let command = super::command_line().join(" ");
-    let mut files = calibration.files(&Export { offsets: args.offsets.into(), poses, command })?;
-    if stages::are_told() {
-        files.insert(TIMINGS.to_owned(), stages::timings());
-    }
     let folder = place.path().to_path_buf();
-    place.write_all(&files)?;
+    let result = place.begin()?;
+    calibration.write(&Export { offsets: args.offsets.into(), poses, command }, &result)?;
+    drop(calibration);
+    if stages::are_told() {
+        result.put(TIMINGS, &stages::timings())?;
+    }
+    result.finish()?;
     // What is printed is what `show` prints: it comes from the file.
-    let bytes = files.get(FILE_NAME).map_or(&[][..], Vec::as_slice);
-    let record = solution_json::read(bytes)?;
+    let record = read_solution(&folder)?;
     match (args.json, stages::are_told()) {
-        (true, _) => say!("{}", String::from_utf8_lossy(bytes)),
+        (true, _) => say!("{}", files::read_text(&folder.join(FILE_NAME), FileKind::Solution)?),
         (_, true) => {
             say!("{}{}", long_table::text(&record), args.at.run(&record, &folder)?);
-            say_line!("results   {} ({} files)", folder.display(), files.len());
+            // The times of the stages go with the result.
+            say_line!("results   {} ({} files)", folder.display(), record.files.len() + 1);
         }
         _ => say!("{}{}", summary::text(&record, &folder), args.at.run(&record, &folder)?),
     }

@@ -1,8 +1,8 @@
 //! Solution -> bytes.
 //!
-//! Exporters are pure: [`files`] and [`stand_alone_files`] make every file of a result in memory (for small pictures in the report they look at images of the series),
-//! [`write_all`] alone writes.
-//! A new exporter is one file here and one row in [`files`].
+//! Exporters are pure: [`each_file`] and [`stand_alone_files`] make every file of a result in memory (for small pictures in the report they look at images of the series),
+//! [`ResultFolder`] alone writes.
+//! A new exporter is one file here and one row in [`each_file`].
 
 mod bodies_record;
 mod camera_file;
@@ -87,55 +87,62 @@ use crate::problem::Adjustment;
 /// Every file of the result: name -> bytes.
 ///
 /// # Errors
-/// A camera that a ROS camera_info cannot express, a URDF that cannot be patched, estimates that are not finite.
+/// As of [`each_file`].
 pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, Vec<u8>>> {
+    let mut files = BTreeMap::new();
+    each_file(solution, context, &mut |name, bytes| {
+        files.insert(name.to_owned(), bytes);
+        Ok(())
+    })?;
+    Ok(files)
+}
+
+/// Makes the files of the result one after the other and hands each to `put`, by name: of very many images they are large, and
+/// need not be in memory together.
+///
+/// # Errors
+/// A camera that a ROS camera_info cannot express, a URDF that cannot be patched, estimates that are not finite; errors of `put`.
+pub fn each_file(
+    solution: &Solution,
+    context: &Context,
+    put: &mut impl FnMut(&str, Vec<u8>) -> Result<()>,
+) -> Result<()> {
     let gauge = gauge::Gauge::of(&solution.fit)?;
     let Adjustment { problem, state } = &solution.fit.adjustment;
     let depths = depths_m(problem, &solution.free_poses);
-    let mut files = BTreeMap::new();
-    let mut add = |name: String, text: String| files.insert(name, text.into_bytes());
+    let mut names: Vec<String> = Vec::new();
+    let mut add = |name: String, bytes: Vec<u8>| {
+        put(&name, bytes)?;
+        names.push(name);
+        Ok(())
+    };
     // Poses of a controller tell nothing of its robot.
     if state.robot.chain.pose_coordinates().is_none() {
-        for (name, text) in robot_files::all(solution, context)? {
-            add(name, text);
-        }
-    }
-    for (name, text) in camera_file::cameras(&problem.cameras, &state.cameras, &depths)? {
-        add(name, text);
-    }
-    for (name, text) in pose_files::mountings(solution).into_iter().chain(pose_files::placements(solution, &gauge)) {
-        add(name, text);
-    }
-    for (name, text) in plate_files::plates(&solution.fit, &context.series, &gauge)? {
-        add(name, text);
+        robot_files::all(solution, context)?.into_iter().try_for_each(|(name, text)| add(name, text.into_bytes()))?;
     }
     let images = names::ImageNames::new(problem, &context.series);
+    let texts = (camera_file::cameras(&problem.cameras, &state.cameras, &depths)?.into_iter())
+        .chain(pose_files::mountings(solution))
+        .chain(pose_files::placements(solution, &gauge))
+        .chain(plate_files::plates(&solution.fit, &context.series, &gauge)?);
+    texts.into_iter().try_for_each(|(name, text)| add(name, text.into_bytes()))?;
+    let mut together = None;
     if context.poses == Poses::Written {
-        add("poses.csv".into(), pose_files::poses_csv(&images, &solution.free_poses));
+        add("poses.csv".into(), pose_files::poses_csv(&images, &solution.free_poses).into_bytes())?;
+        if let Some((order, covariance)) = solution.poses_together()? {
+            add(pose_files::TOGETHER.into(), npy::matrix(&covariance))?;
+            together = Some(order.into_iter().map(|i| images.of(i).to_owned()).collect());
+        }
     }
-    let together = if context.poses == Poses::Written { solution.poses_together()? } else { None };
-    if let Some((_, covariance)) = &together {
-        files.insert(pose_files::TOGETHER.into(), npy::matrix(covariance));
-    }
-    let mut names: Vec<String> = files.keys().cloned().collect();
     names.extend([solution_json::FILE_NAME, observation_table::FILE_NAME].map(str::to_owned));
     #[cfg(feature = "report")]
     names.push(report::FILE_NAME.to_owned());
     names.sort();
     let mut record = solution_record::record(solution, context, &gauge, names)?;
-    record.covariance_together =
-        together.map(|(order, _)| order.into_iter().map(|i| images.of(i).to_owned()).collect());
+    record.covariance_together = together;
     #[cfg(feature = "report")]
-    files.insert(
-        report::FILE_NAME.into(),
-        report::report_html(&record, &Thumbnails::of_files(record.photogrammetry())).into_bytes(),
-    );
-    files.insert(solution_json::FILE_NAME.into(), solution_json::to_bytes(&record)?);
-    // Of very many images record and table are large, and not both are needed.
+    put(report::FILE_NAME, report::report_html(&record, &Thumbnails::of_files(record.photogrammetry())).into_bytes())?;
+    put(solution_json::FILE_NAME, solution_json::to_bytes(&record)?)?;
     drop(record);
-    files.insert(
-        observation_table::FILE_NAME.into(),
-        observation_table::observations_csv(&solution.fit, &context.series).into_bytes(),
-    );
-    Ok(files)
+    put(observation_table::FILE_NAME, observation_table::observations_csv(&solution.fit, &context.series).into_bytes())
 }
