@@ -17,7 +17,7 @@ use crate::output::poses_record::{usual, worst};
 use crate::output::stand_alone_files::{self, StandAloneContext, stand_alone_files};
 use crate::output::{REPORT, ResultFolder, folder_name};
 use crate::problem::{Adjustment, MeasuredSeries};
-use crate::series::{InputFile, Series, read_without_robot, series_of_images};
+use crate::series::{InputFile, Series, Source, read_without_robot, series_of_images};
 use crate::urdf::Chain;
 
 /// Images of which the table has a row each; of more, the worst.
@@ -61,14 +61,18 @@ pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
         Some(place) => place,
         None => claim(&Path::new("reports").join(format!("{}-poses", folder_name(&names))))?,
     };
-    let mut series = pictures.of_recordings(series, &args.recording.options(&[])?)?;
-    series.iter_mut().for_each(forget_joints);
-    let mut inputs: Vec<InputFile> = Vec::new();
+    let series = pictures.of_recordings(series, &args.recording.options(&[])?)?;
+    let (mut inputs, mut notices): (Vec<InputFile>, Vec<Notice>) = Default::default();
     for s in &series {
         inputs.extend(s.inputs.iter().cloned());
         inputs.extend(s.image_hashes()?);
+        if let Source::Cameras(_) = &s.source {
+            notices.extend(s.notices.iter().cloned());
+        }
     }
-    let (mut measured, mut notices) = observe(&series)?;
+    let views: Vec<Series> = series.iter().flat_map(Series::views).cloned().map(without_joints).collect();
+    let (mut measured, seen) = observe(&views)?;
+    notices.extend(seen);
     series.iter().try_for_each(|s| require_unchanged(&inputs, &s.image_hashes()?))?;
     notices.extend(args.cameras.apply(&mut measured)?);
     let limits = Limits::default();
@@ -78,6 +82,7 @@ pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
     let against = args.against.as_deref().map(|path| Ok((path.display().to_string(), against::compare(&found, path)?)));
     let against = against.transpose()?;
     let notices = Notice::said_once(&notices);
+    let names = measured.iter().map(|s| s.name.clone()).collect();
     let context = StandAloneContext { series: names, inputs, command, limits, notices, against };
     let files = stand_alone_files(&found, &context)?;
     let folder = place.path().to_path_buf();
@@ -97,9 +102,10 @@ pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
 }
 
 /// No robot takes part.
-fn forget_joints(series: &mut Series) {
-    series.stops.joints.clear();
-    series.stops.stops.iter_mut().for_each(|stop| stop.raw_readings = None);
+fn without_joints(mut view: Series) -> Series {
+    view.stops.joints.clear();
+    view.stops.stops.iter_mut().for_each(|stop| stop.raw_readings = None);
+    view
 }
 
 fn observe(series: &[Series]) -> Result<(Vec<MeasuredSeries>, Vec<Notice>)> {
