@@ -81,7 +81,10 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     moved.iter().for_each(say_moved);
     odd.iter().for_each(say_odd);
     let mut reasons = Reasons::default();
-    reasons.doubts.extend(odd.as_ref().map(|odd| format!("{} points are wrong, or their readings", odd.points.len())));
+    reasons.doubts.extend(odd.as_ref().map(|odd| match odd.points.len() {
+        1 => "one point is wrong, or its readings".to_owned(),
+        count => format!("{count} points are wrong, or their readings"),
+    }));
     // Wrong points are none of the robot's errors.
     let rms_m = odd.as_ref().map_or(model.fit.rms_m, |odd| odd.without.rms_m);
     let left_out = odd.as_ref().map_or(&[][..], |odd| &odd.points);

@@ -73,7 +73,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let late = told.late();
     scan.notices.extend(late.map(|d| d.notice(recording)));
     let growth_s = scan.delay_growth_s(&image_topic) - scan.delay_growth_s(&topics[0]);
-    let is_open = told == Told::Nothing && options.clock == Clock::Stamp && image_delay_s.abs() > NOTABLE_DELAY_S;
+    let is_open = told == Told::Open && options.clock == Clock::Stamp && image_delay_s.abs() > NOTABLE_DELAY_S;
     let open_s = if is_open { -image_delay_s } else { 0.0 };
     let groups = groups(&mut scan, &postures, &times, options, nanoseconds(open_s))?;
     std::fs::create_dir_all(images).map_err(|e| Error::io(images, &e))?;
@@ -155,9 +155,9 @@ enum Told {
     /// What the images show tells it.
     Found(Delay),
     /// What the images show tells that there is none.
-    None,
+    NoDelay,
     /// The images do not tell it.
-    Nothing,
+    Open,
 }
 
 impl Told {
@@ -178,7 +178,7 @@ fn told_by_motion(
     options: &RecordingOptions,
 ) -> Result<Told> {
     let still = standstills(postures, options.still_speed, nanoseconds(options.least_still_s));
-    let Some(mut frames) = Frames::about_motions(times, &still, guess) else { return Ok(Told::Nothing) };
+    let Some(mut frames) = Frames::about_motions(times, &still, guess) else { return Ok(Told::Open) };
     for file in &scan.files {
         for_each(file, |message| {
             if message.topic == topic {
@@ -190,8 +190,8 @@ fn told_by_motion(
     let pairs = frames.pairs();
     Ok(match delay::measured(&pairs, postures, guess) {
         Some(delay) if delay.is_notable(&pairs) => Told::Found(delay),
-        Some(_) => Told::None,
-        None => Told::Nothing,
+        Some(_) => Told::NoDelay,
+        None => Told::Open,
     })
 }
 
