@@ -51,7 +51,9 @@ pub struct Sight<'a> {
 
 /// Collects the equations of one image.
 pub(super) struct Collector {
-    columns: DMatrix<f64>,
+    /// Equations one after the other, two an observation, of [`Collector::rows`] each.
+    columns: Vec<f64>,
+    rows: usize,
     markers: Vec<usize>,
     field: Vec<Field>,
 }
@@ -59,8 +61,9 @@ pub(super) struct Collector {
 impl Collector {
     /// For at most so many observations, with a lens formula of `formula` parameters.
     pub fn new(most: usize, formula: usize) -> Self {
-        let columns = DMatrix::zeros(FORMULA + formula, 2 * most);
-        Self { columns, markers: Vec::with_capacity(most), field: Vec::new() }
+        let rows = FORMULA + formula;
+        let columns = Vec::with_capacity(2 * most * rows);
+        Self { columns, rows, markers: Vec::with_capacity(most), field: Vec::new() }
     }
 
     /// Adds an observation with its derivative by the modes of the plate, its residual and the square root `F'` of its weight.
@@ -73,13 +76,12 @@ impl Collector {
         r: &Vector2<f64>,
         root: &Matrix2<f64>,
     ) {
-        let rows = self.columns.nrows();
-        let pair = self.columns.as_mut_slice().chunks_exact_mut(2 * rows).nth(self.markers.len());
-        for (first, second) in pair.into_iter().map(|pair| pair.split_at_mut(rows)) {
-            whiten(&mut first[POSE..], &mut second[POSE..], root, &p.d_pose);
-            whiten(&mut first[MODE..], &mut second[MODE..], root, by_modes);
-            whiten(&mut first[RESIDUAL..], &mut second[RESIDUAL..], root, &r.transpose());
-            whiten(&mut first[FORMULA..], &mut second[FORMULA..], root, &p.d_camera);
+        for (by_u, by_v) in [(root[(0, 0)], root[(0, 1)]), (0.0, root[(1, 1)])] {
+            let end = self.columns.len() + self.rows;
+            self.columns.extend(whitened(by_u, by_v, &p.d_pose));
+            self.columns.extend(whitened(by_u, by_v, by_modes));
+            self.columns.extend(whitened(by_u, by_v, &r.transpose()));
+            self.columns.extend(whitened(by_u, by_v, &p.d_camera).take(end - self.columns.len()));
         }
         self.markers.push(marker);
         if !p.d_field.is_empty() {
@@ -88,27 +90,22 @@ impl Collector {
     }
 
     pub fn finish(self) -> Equations {
-        let Self { mut columns, markers, mut field } = self;
+        let Self { columns, rows, markers, mut field } = self;
         let mut touched: Vec<usize> = field.iter().flatten().map(|(k, _)| *k).collect();
         touched.sort_unstable();
         touched.dedup();
         let place = |k: usize| touched.partition_point(|t| *t < k);
         field.iter_mut().flatten().for_each(|(k, _)| *k = place(*k));
-        if columns.ncols() > 2 * markers.len() {
-            columns = columns.resize_horizontally(2 * markers.len(), 0.0);
-        }
+        let columns = DMatrix::from_vec(rows, 2 * markers.len(), columns);
         Equations { columns, markers, field, touched }
     }
 }
 
-/// Puts rows, each a derivative of column and row of the image, as far as there is place for them, into both equations.
+/// Rows of one whitened equation, of rows that are each a derivative of column and row of the image.
 #[inline(always)]
-fn whiten<const N: usize>(first: &mut [f64], second: &mut [f64], root: &Matrix2<f64>, rows: &SMatrix<f64, N, 2>) {
+fn whitened<const N: usize>(by_u: f64, by_v: f64, rows: &SMatrix<f64, N, 2>) -> impl Iterator<Item = f64> {
     let (u, v) = rows.as_slice().split_at(N);
-    for (((first, second), u), v) in first.iter_mut().zip(second).zip(u).zip(v) {
-        *first = root[(0, 0)] * u + root[(0, 1)] * v;
-        *second = root[(1, 1)] * v;
-    }
+    u.iter().zip(v).map(move |(u, v)| by_u * u + by_v * v)
 }
 
 /// Row of the equations that belongs to an intrinsic unknown before the field.
