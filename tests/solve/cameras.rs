@@ -2,7 +2,7 @@
 
 use nalgebra::{DVector, Vector3};
 use robotcal::geom::{Pose, exp_so3};
-use robotcal::identify::{Options, Selection, Solution, identify};
+use robotcal::identify::{JointNoise, Options, Selection, Solution, identify};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::Robot;
 use robotcal::output::{self, restore, solution_json};
@@ -12,7 +12,7 @@ use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use crate::outputs_support::{context, robot, scene};
 use crate::support::small::Dice;
 
-const JOINT_SIGMA: f64 = 3e-4;
+pub const JOINT_SIGMA: f64 = 3e-4;
 const PIXEL_SIGMA: f64 = 0.05;
 
 fn displaced(pose: &Pose, [tilt, spin, across, along]: [f64; 4], dice: &mut Dice) -> Pose {
@@ -25,10 +25,25 @@ fn displaced(pose: &Pose, [tilt, spin, across, along]: [f64; 4], dice: &mut Dice
     Pose::new(turned.rotation, turned.translation + shift)
 }
 
-/// What cameras with these mounts saw at the same stops, and what the joints were off by at each of them.
-struct Seen {
-    series: Vec<MeasuredSeries>,
-    joint_errors: Vec<Vec<f64>>,
+/// What was measured at the same stops, and what the joints were off by at each of them.
+pub struct Seen {
+    pub series: Vec<MeasuredSeries>,
+    pub joint_errors: Vec<Vec<f64>>,
+}
+
+/// Readings of a stop, and what they are off by, rad.
+#[derive(Clone)]
+pub struct Taken {
+    pub readings: Vec<f64>,
+    pub errors: Vec<f64>,
+}
+
+impl Taken {
+    pub fn near(middle: &[f64; 6], dice: &mut Dice) -> Self {
+        let reach = [0.3, 0.3, 0.3, 1.0, 0.7, 1.5];
+        let readings = (0..6).map(|i| middle[i] + dice.between(-reach[i], reach[i])).collect();
+        Self { readings, errors: (0..6).map(|_| dice.normal(JOINT_SIGMA)).collect() }
+    }
 }
 
 /// A camera and its plate; each further fixed camera looks from another side.
@@ -53,24 +68,32 @@ fn seen(mounts: &[CameraMount], wanted: usize, seed: u64) -> Seen {
 
 /// The same, where the pose that an image shows is off by itself: tilt, spin (rad), shift across the optical axis and along it (m).
 fn seen_displaced(mounts: &[CameraMount], wanted: usize, seed: u64, sizes: [f64; 4]) -> Seen {
-    println!("seed {seed}");
-    let mut dice = Dice::new(seed);
+    let nominal = Robot::nominal(robot().chain(None, None).unwrap());
+    let middle = scene(mounts[0], &nominal).middle;
+    seen_at(mounts, wanted, &mut Dice::new(seed), sizes, |_, dice| Some(Taken::near(&middle, dice)))
+}
+
+/// The same, where the stops are taken as `at` says of each; without cameras, what was taken alone.
+pub fn seen_at(
+    mounts: &[CameraMount],
+    wanted: usize,
+    dice: &mut Dice,
+    sizes: [f64; 4],
+    mut at: impl FnMut(usize, &mut Dice) -> Option<Taken>,
+) -> Seen {
     let nominal = Robot::nominal(robot().chain(None, None).unwrap());
     let plate = Plate::lattice(PlateKind::Points, 8, 6, 0.03, 1e-6);
     let mut camera = Camera::pinhole(Lens::Brown, 1280, 1024, 1100.0);
     camera.parameters = vec![1103.0, 1101.0, 645.0, 508.0, -0.15, 0.03, 8e-4, -5e-4, 0.0];
     let cameras: Vec<(Pose, Pose)> = (0..mounts.len()).map(|k| placed(mounts, &nominal, k)).collect();
     let (mut stops, mut joint_errors) = (vec![Vec::new(); mounts.len()], Vec::new());
-    let middle = scene(mounts[0], &nominal).middle;
     while joint_errors.len() < wanted {
-        let reach = [0.3, 0.3, 0.3, 1.0, 0.7, 1.5];
-        let readings: Vec<f64> = (0..6).map(|i| middle[i] + dice.between(-reach[i], reach[i])).collect();
-        let errors: Vec<f64> = (0..6).map(|_| dice.normal(JOINT_SIGMA)).collect();
+        let Some(Taken { readings, errors }) = at(joint_errors.len(), dice) else { continue };
         let moved: Vec<f64> = readings.iter().zip(&errors).map(|(q, e)| q + e).collect();
         let tip = nominal.base_from_tip(&moved);
         let poses: Vec<Pose> =
             cameras.iter().zip(mounts).map(|((c, p), mount)| mount.camera_from_plate(c, &tip, p)).collect();
-        let poses: Vec<Pose> = poses.into_iter().map(|pose| displaced(&pose, sizes, &mut dice)).collect();
+        let poses: Vec<Pose> = poses.into_iter().map(|pose| displaced(&pose, sizes, dice)).collect();
         let faces = |p: &Pose| p.rotation.column(2).dot(&p.translation) < -0.5 * p.translation.norm();
         let shows = |p: &Pose| faces(p) && (0.12..0.9).contains(&p.translation.norm());
         let views: Vec<Vec<Observation>> = poses
@@ -90,7 +113,7 @@ fn seen_displaced(mounts: &[CameraMount], wanted: usize, seed: u64, sizes: [f64;
                 if shows(pose) { plate.markers.iter().filter_map(see).collect() } else { Vec::new() }
             })
             .collect();
-        if views.iter().all(|v| v.len() < 20) {
+        if !views.is_empty() && views.iter().all(|v| v.len() < 20) {
             continue;
         }
         let row = joint_errors.len();
@@ -132,15 +155,21 @@ fn seen_displaced(mounts: &[CameraMount], wanted: usize, seed: u64, sizes: [f64;
     Seen { series: stops.into_iter().enumerate().map(series).collect(), joint_errors }
 }
 
-/// Cameras, plates and joint noise are estimated, the robot is as it is.
-fn solved(seen: &Seen) -> Solution {
+/// Cameras, plates, bodies and joint noise are estimated, the robot is as it is.
+pub fn solved(seen: &Seen) -> Solution {
+    solved_with(seen, JointNoise::Estimated)
+}
+
+/// The same, where the size of the joint noise may be known.
+pub fn solved_with(seen: &Seen, joint_noise: JointNoise) -> Solution {
     let selection = Selection { fix: vec!["robot".into()], ..Selection::default() };
-    let options = Options { model: robotcal::identify::RobotModel::Rigid, selection, ..Options::default() };
+    let options =
+        Options { joint_noise, model: robotcal::identify::RobotModel::Rigid, selection, ..Options::default() };
     identify(robot().chain(None, None).unwrap(), &seen.series, &options).unwrap()
 }
 
 /// Errors of the latent joint errors in units of their covariance: the mean of their squares is 1 where this is right.
-fn normalised(seen: &Seen, solution: &Solution) -> f64 {
+pub fn normalised(seen: &Seen, solution: &Solution) -> f64 {
     let fit = &solution.fit;
     let (mut sum, mut count) = (0.0, 0.0);
     for stop in fit.linear().stops() {

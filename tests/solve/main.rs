@@ -20,6 +20,7 @@ mod knowledge;
 mod lens_study;
 mod marker_tolerance;
 mod measured_worlds;
+mod mixtures;
 mod moved_in_time;
 mod normal_equations;
 mod patterns;

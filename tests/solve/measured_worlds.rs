@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 use robotcal::assess::{MeasuredPoint, fit_points};
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
@@ -55,6 +55,34 @@ pub fn readings(dice: &mut Dice) -> Vec<f64> {
     middle.iter().zip(reach).map(|(m, r)| m + dice.between(-r, r)).collect()
 }
 
+/// Readings near `q` with which a robot whose readings are off by `errors` has the ball where it is wanted.
+pub fn with_ball_at(
+    truth: &Robot,
+    mut q: Vec<f64>,
+    errors: &[f64],
+    ball: &Pose,
+    wanted: &Vector3<f64>,
+) -> Option<Vec<f64>> {
+    for _ in 0..30 {
+        let kinematics = truth.kinematics(&Posture::at(&q), errors);
+        let body = kinematics.base_from_tip * *ball;
+        let missing = wanted - body.translation;
+        if missing.norm() < 1e-12 {
+            return (q.iter().all(|q| q.abs() < 3.0)).then_some(q);
+        }
+        let by_reading = |d: &Vector6<f64>| {
+            let (rho, phi) = (d.fixed_rows::<3>(0).into_owned(), d.fixed_rows::<3>(3).into_owned());
+            kinematics.base_from_tip.rotation * (rho + phi.cross(&ball.translation))
+        };
+        let j = nalgebra::Matrix3xX::from_columns(&kinematics.d_readings.iter().map(by_reading).collect::<Vec<_>>());
+        let step = j.svd(true, true).pseudo_inverse(1e-9).unwrap() * missing;
+        let longest = step.amax();
+        let share = if longest > 0.3 { 0.3 / longest } else { 1.0 };
+        q.iter_mut().zip(step.iter()).for_each(|(q, s)| *q += share * s);
+    }
+    None
+}
+
 impl World {
     pub fn new(seed: u64, kind: Kind, stops: usize, sigmas: (f64, f64), noise_rad: f64) -> Self {
         let mut dice = Dice::new(seed);
@@ -105,7 +133,7 @@ impl World {
             let tracker_from_body = base_from_tracker.inverse() * body;
             let jitter = Vector3::from_fn(|_, _| dice.normal(sigma_m));
             let turn = Vector3::from_fn(|_, _| dice.normal(sigma_rad));
-            let noise = nalgebra::Vector6::new(jitter.x, jitter.y, jitter.z, turn.x, turn.y, turn.z);
+            let noise = Vector6::new(jitter.x, jitter.y, jitter.z, turn.x, turn.y, turn.z);
             let measured = tracker_from_body.perturbed(&noise);
             let what = match kind {
                 Kind::Points => BodySeen::Point(measured.translation),
@@ -170,32 +198,10 @@ impl World {
 
     /// Readings with which the true robot, its joint errors included, has the ball in the socket up to its noise.
     pub fn reached(&self, dice: &mut Dice, ball: &Pose, centre: &Vector3<f64>) -> Option<Vec<f64>> {
-        let mut q = readings(dice);
+        let q = readings(dice);
         let errors: Vec<f64> = (0..q.len()).map(|_| dice.normal(self.noise_rad)).collect();
         let wanted = centre + Vector3::from_fn(|_, _| dice.normal(self.sigma_m));
-        for _ in 0..30 {
-            let kinematics = self.truth.kinematics(&Posture::at(&q), &errors);
-            let body = kinematics.base_from_tip * *ball;
-            let missing = wanted - body.translation;
-            if missing.norm() < 1e-12 {
-                return (q.iter().all(|q| q.abs() < 3.0)).then_some(q);
-            }
-            let j = nalgebra::Matrix3xX::from_columns(
-                &kinematics
-                    .d_readings
-                    .iter()
-                    .map(|d| {
-                        let (rho, phi) = (d.fixed_rows::<3>(0).into_owned(), d.fixed_rows::<3>(3).into_owned());
-                        kinematics.base_from_tip.rotation * (rho + phi.cross(&ball.translation))
-                    })
-                    .collect::<Vec<_>>(),
-            );
-            let step = j.clone().svd(true, true).pseudo_inverse(1e-9).unwrap() * missing;
-            let longest = step.amax();
-            let share = if longest > 0.3 { 0.3 / longest } else { 1.0 };
-            q.iter_mut().zip(step.iter()).for_each(|(q, s)| *q += share * s);
-        }
-        None
+        with_ball_at(&self.truth, q, &errors, ball, &wanted)
     }
 
     pub fn solve(&self, model: RobotModel) -> Solution {
