@@ -122,6 +122,44 @@ fn a_good_series_has_every_chapter_and_a_row_for_each_image() {
     }
 }
 
+/// Has the images of a series taken by two cameras by turns.
+fn of_two_cameras(series: &str) {
+    let change = |name: &str, change: &dyn Fn(&str) -> String| {
+        let file = Path::new(series).join(name);
+        std::fs::write(&file, change(&std::fs::read_to_string(&file).unwrap())).unwrap();
+    };
+    let size = "width_px = 1280\nheight_px = 1024\n";
+    change("series.toml", &|text| {
+        let (before, _) = text.split_once("camera_mount").unwrap();
+        let camera = |name: &str| format!("[[camera]]\nname = \"{name}\"\nmount = \"hand\"\n{size}");
+        format!("{before}plate = \"plate.toml\"\n{}{}", camera("left"), camera("right"))
+    });
+    let mut images = "stop,camera,image\n".to_owned();
+    let joints = std::fs::read_to_string(Path::new(series).join("joints.csv")).unwrap();
+    for (k, image) in joints.lines().skip(1).filter_map(|line| line.split(',').next()).enumerate() {
+        images += &format!("{image},{},{image}\n", ["left", "right"][k % 2]);
+    }
+    std::fs::write(Path::new(series).join("images.csv"), images).unwrap();
+    change("joints.csv", &|text| text.replacen("image,", "stop,", 1));
+}
+
+#[test]
+fn a_series_of_two_cameras_is_adjusted_as_a_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let series = simulated(folder.path(), 24, "brown");
+    of_two_cameras(&series);
+    let made = poses(folder.path(), &series, &["--against", &format!("{series}/truth.toml")]);
+    assert_eq!((made.exit, made.verdict()), (Some(0), "good"));
+    made.stands_by_itself();
+    assert_eq!(made.table().len(), 24);
+    for camera in ["left", "right"] {
+        assert!(folder.path().join(format!("poses/camera.{camera}.yaml")).is_file(), "{camera}");
+    }
+    let off = made.record["against"]["normalised_error_squared"].as_f64().unwrap();
+    // Of 144 numbers, that the cameras' parameters have in common.
+    assert!((0.3..2.5).contains(&off), "{off}");
+}
+
 /// As a viewer that turns a picture by half a turn leaves it.
 #[test]
 fn an_image_that_is_left_out_is_named_with_its_reason() {
