@@ -3,12 +3,12 @@
 //! The `calib-targets` library decodes the markers and so tells which corner is which; the positions are measured as on
 //! a plain chessboard, from the pixels along the edges that the markers leave free.
 
-use calib_targets_chessboard::detect_corners;
-
 use super::board_labels::{BoardSize, Lattice, Placement};
+use super::bytes::Bytes;
 use super::charuco_markers::{Marker, Print, decode, prints};
 use super::charuco_seen::{Seen, instead};
-use super::chessboard::{Bytes, WINDOW, board_size, corner_config};
+use super::chessboard::{WINDOW, board_size};
+use super::corner_finder::find_corners;
 use super::corners::{Window, measure};
 use super::sizes::{best_of_sizes, on_picture};
 use super::{Detection, Outline, Picture};
@@ -116,7 +116,7 @@ impl Found {
 /// The print that explains most markers in the picture at another size, with what was found.
 fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least: usize) -> Result<Option<Found>> {
     let scaled = bytes.scaled(scale);
-    let corners = detect_corners(&scaled.view(), &corner_config());
+    let corners = find_corners(&scaled);
     let mut best: Option<Found> = None;
     let mut all: Vec<(bool, (usize, usize))> = Vec::new();
     for print in prints {

@@ -9,7 +9,7 @@ use calib_targets_chessboard::ChessCorner;
 use calib_targets_core::{Coord, GrayImageView};
 
 use super::board_labels::BoardSize;
-use super::chessboard::corner_config;
+use super::corner_finder::corner_config;
 use super::tag_scan::usual_dictionaries;
 use crate::error::{Code, Error, Result};
 use crate::series::{Plate, dictionary_named};

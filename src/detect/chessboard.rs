@@ -3,19 +3,18 @@
 //! The lattice of corners comes from the `calib-targets` library; which corner is which, the sub-pixel position in the
 //! full depth of the picture and its covariance are found here.
 
-use std::borrow::Cow;
 use std::cell::LazyCell;
 
-use calib_targets_chessboard::{ChessboardDetector, ChessboardParams, detect_corners};
-use calib_targets_core::{DetectorConfig, GrayImageView, ImageRefiner, default_chess_config};
+use calib_targets_chessboard::{ChessboardDetector, ChessboardParams};
 
 use super::board_ends::Ends;
 use super::board_labels::{BoardSize, Labelling, Lattice, Placement, label};
 use super::board_seen::BoardSeen;
+use super::bytes::Bytes;
+use super::corner_finder::find_corners;
 use super::corners::{Window, measure};
 use super::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
-use crate::linalg::wide;
 use crate::series::Plate;
 
 /// Pixels for one corner: as far along the edges as the next corners do not disturb, and near enough that the lens
@@ -96,7 +95,7 @@ fn find_lattice(picture: &Picture, board: BoardSize) -> Option<Lattice> {
     for scale in scales {
         // Pixels are counted from their centres.
         let on_picture = |c: f64| (c + 0.5) / scale - 0.5;
-        let Some(lattice) = bytes.scaled(scale).lattice() else { continue };
+        let Some(lattice) = lattice(&bytes.scaled(scale)) else { continue };
         if best.as_ref().is_none_or(|other| lattice.len() >= other.len()) {
             best = Some(lattice.into_iter().map(|(key, uv)| (key, uv.map(on_picture))).collect());
         }
@@ -107,113 +106,11 @@ fn find_lattice(picture: &Picture, board: BoardSize) -> Option<Lattice> {
     best
 }
 
-/// A picture in 8 bits, for finding corners only.
-#[derive(Debug, Clone)]
-pub(super) struct Bytes {
-    pub width: usize,
-    pub height: usize,
-    pub data: Vec<u8>,
-}
-
-impl Bytes {
-    /// Bright 8-bit pictures stay as they are, others are stretched so that all but the brightest thousandth of their pixels fit.
-    pub fn of(picture: &Picture) -> Self {
-        let scale = if is_bright(picture) { 1.0 } else { 255.0 / bright_level(picture) };
-        let mut data = vec![0; picture.pixels.len()];
-        wide(
-            #[inline(always)]
-            || data.iter_mut().zip(&picture.pixels).for_each(|(byte, p)| *byte = (p * scale + 0.5) as u8),
-        );
-        Self { width: picture.width, height: picture.height, data }
-    }
-
-    /// Means of two by two pixels.
-    pub fn halved(&self) -> Self {
-        let (width, height) = (self.width / 2, self.height / 2);
-        let mut data = Vec::with_capacity(width * height);
-        for pair in self.data.chunks_exact(2 * self.width) {
-            let (top, bottom) = pair.split_at(self.width);
-            let sum = |(t, b): (&[u8; 2], &[u8; 2])| [t[0], t[1], b[0], b[1]].map(u16::from).iter().sum::<u16>();
-            let (top, bottom) = (top.as_chunks::<2>().0, bottom.as_chunks::<2>().0);
-            data.extend(top.iter().zip(bottom).map(|p| ((sum(p) + 2) / 4) as u8));
-        }
-        Self { width, height, data }
-    }
-
-    /// At another size: halved as often as that goes, the rest by bilinear interpolation.
-    pub fn scaled(&self, scale: f64) -> Cow<'_, Self> {
-        if scale == 1.0 {
-            return Cow::Borrowed(self);
-        }
-        if scale <= 0.5 {
-            return Cow::Owned(self.halved().scaled(2.0 * scale).into_owned());
-        }
-        let side = |n: usize| ((n as f64 * scale).floor() as usize).max(1);
-        let (width, height) = (side(self.width), side(self.height));
-        let source = |k: usize, last: usize| ((k as f64 + 0.5) / scale - 0.5).clamp(0.0, last as f64);
-        let at = |x: usize, y: usize| f64::from(self.data[y * self.width + x]);
-        let value = |k: usize| {
-            let (x, y) = (source(k % width, self.width - 1), source(k / width, self.height - 1));
-            let (x0, y0) = (x as usize, y as usize);
-            let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(self.height - 1));
-            let (p, q) = (x - x0 as f64, y - y0 as f64);
-            let row = |y: usize| at(x0, y) * (1.0 - p) + at(x1, y) * p;
-            (row(y0) * (1.0 - q) + row(y1) * q + 0.5) as u8
-        };
-        Cow::Owned(Self { width, height, data: (0..width * height).map(value).collect() })
-    }
-
-    /// Left to right.
-    pub fn mirror(&mut self) {
-        self.data.chunks_exact_mut(self.width).for_each(<[u8]>::reverse);
-    }
-
-    pub fn view(&self) -> GrayImageView<'_> {
-        GrayImageView { width: self.width, height: self.height, data: &self.data }
-    }
-
-    fn lattice(&self) -> Option<Lattice> {
-        let corners = detect_corners(&self.view(), &corner_config());
-        let found = ChessboardDetector::new(ChessboardParams::default()).ok()?.detect(&corners)?;
-        let at = |x: f32, y: f32| [f64::from(x), f64::from(y)];
-        Some(found.corners.iter().map(|c| ((c.grid.u, c.grid.v), at(c.position.x, c.position.y))).collect())
-    }
-}
-
-/// Saddle fit over 9 x 9 px: half the scatter of the library's default on real images.
-pub(super) fn corner_config() -> DetectorConfig {
-    let mut refiner = ImageRefiner::saddle_point();
-    if let ImageRefiner::SaddlePoint(config) = &mut refiner {
-        config.radius = 4;
-        config.max_offset = 3.0;
-    }
-    default_chess_config().with_refiner(refiner)
-}
-
-/// Whether an 8-bit picture has more than a thousandth of its pixels in the upper half of its range.
-fn is_bright(picture: &Picture) -> bool {
-    let upper = wide(
-        #[inline(always)]
-        || picture.pixels.iter().map(|&p| u32::from(p >= 128.0)).sum::<u32>(),
-    );
-    picture.full_scale <= 255.0 && upper as usize > picture.pixels.len() / 1000
-}
-
-/// Count below which all but a thousandth of the pixels lie.
-fn bright_level(picture: &Picture) -> f32 {
-    let step = 4096.0 / picture.full_scale;
-    let mut histogram = [0usize; 4097];
-    for &p in &picture.pixels {
-        histogram[((p * step) as usize).min(4096)] += 1;
-    }
-    let mut above = picture.pixels.len() / 1000;
-    for (bin, &count) in histogram.iter().enumerate().rev() {
-        if count > above {
-            return (bin + 1) as f32 / step;
-        }
-        above -= count;
-    }
-    picture.full_scale
+/// The corners of a regular lattice.
+fn lattice(bytes: &Bytes) -> Option<Lattice> {
+    let found = ChessboardDetector::new(ChessboardParams::default()).ok()?.detect(&find_corners(bytes))?;
+    let at = |x: f32, y: f32| [f64::from(x), f64::from(y)];
+    Some(found.corners.iter().map(|c| ((c.grid.u, c.grid.v), at(c.position.x, c.position.y))).collect())
 }
 
 fn no_board() -> Error {

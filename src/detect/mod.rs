@@ -5,11 +5,13 @@
 mod board_ends;
 mod board_labels;
 mod board_seen;
+mod bytes;
 pub mod charuco;
 mod charuco_markers;
 mod charuco_seen;
 pub mod chessboard;
 pub mod circles;
+mod corner_finder;
 mod corners;
 mod detection;
 mod dot_sizes;

@@ -4,15 +4,16 @@
 //! chance, every corner is compared once more with the dots around it, and the positions are measured as on a plain chessboard, from
 //! the pixels that the dots leave free.
 
-use calib_targets_chessboard::detect_corners;
 use calib_targets_puzzleboard::{
     MASTER_COLS, MASTER_ROWS, PuzzleBoardDetector, PuzzleBoardParams, PuzzleBoardSearchMode, PuzzleBoardSpec,
     PuzzleBoardSpecError,
 };
 
 use super::board_labels::{BoardSize, Lattice, Placement, brightness};
-use super::chessboard::{Bytes, WINDOW, board_size, corner_config};
+use super::bytes::Bytes;
+use super::chessboard::{WINDOW, board_size};
 use super::circles::{FALSE_ALARMS, binomial_tail};
+use super::corner_finder::find_corners;
 use super::corners::{Window, measure};
 use super::sizes::{best_of_sizes, on_picture};
 use super::{Detection, Dropped, Picture};
@@ -101,7 +102,7 @@ impl Reader {
     /// Corners in px of the picture by column and row of the board, seen at another size, where that is hardly a chance.
     fn read(&self, bytes: &Bytes, scale: f64) -> Option<Lattice> {
         let scaled = bytes.scaled(scale);
-        let corners = detect_corners(&scaled.view(), &corner_config());
+        let corners = find_corners(&scaled);
         let found = self.detector.detect_with_corners(&scaled.view(), &corners).ok()?;
         let bits = found.decode.logical_bits;
         let wrong = (f64::from(found.decode.logical_bit_error_rate) * bits as f64).round() as usize;

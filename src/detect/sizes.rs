@@ -1,7 +1,7 @@
 //! At which size of the picture a board with a code is found best.
 
 use super::board_labels::{BoardSize, Lattice};
-use super::chessboard::Bytes;
+use super::bytes::Bytes;
 use crate::error::Result;
 
 /// Sizes of the picture, over its own, at which a code is sought, until one shows most of the board; large pictures begin with half.
