@@ -235,7 +235,8 @@ fn candidates(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Vec<Score
         for v in low.1 - height + 1..=high.1 {
             for u in low.0 - width + 1..=high.0 {
                 let placement = Placement { board, turns, light_first, origin: (u, v) };
-                let corners = lattice.keys().filter(|&&k| placement.id(k).is_some()).count();
+                let (us, vs) = (u..u + width, v..v + height);
+                let corners = lattice.keys().filter(|key| us.contains(&key.0) && vs.contains(&key.1)).count();
                 if 2 * corners >= lattice.len() {
                     all.push(score(placement, corners, shades));
                 }
@@ -248,9 +249,11 @@ fn candidates(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Vec<Score
 
 fn score(placement: Placement, corners: usize, shades: &Shades) -> Scored {
     let (mut colours, mut agreement, mut seen) = (0.0, 0.0, 0.0);
-    for cell in placement.squares() {
-        let Some(shade) = shades.at(cell) else { continue };
-        let signed = if placement.is_dark(cell) { -shade } else { shade };
+    // Squares have the two colours in turn.
+    let even = if placement.is_dark((0, 0)) { -1.0 } else { 1.0 };
+    for (u, v) in placement.squares() {
+        let Some(shade) = shades.at((u, v)) else { continue };
+        let signed = even * parity(u, v) * shade;
         colours += if signed < 0.0 { WRONG_COLOUR * signed } else { signed };
         agreement += signed;
         seen += 1.0;
