@@ -20,8 +20,10 @@
 use nalgebra::Matrix2;
 
 use super::fit::{Saddle, Term};
+use super::model::PARAMETERS;
 use super::raster::{LAGS, NONE, OddPart, REACH, Raster, SIDE};
 use super::small_windows::{Seen, unfollowed};
+use crate::linalg::{add_scaled, sum_of_products, wide};
 
 /// What print, lens and blur of other shapes leave beyond the noise, px per axis; seen on real boards after their
 /// printing errors are taken out.
@@ -62,13 +64,11 @@ impl Correlation {
         let parts: Vec<OddPart> = corners.iter().map(|corner| OddPart::of(corner)).collect();
         for (corner, OddPart { terms, leverages, .. }) in corners.iter().zip(&parts) {
             let scale = 1.0 / (corner.noise * corner.noise).max(f64::MIN_POSITIVE);
-            let mut add = |lag: usize, a: usize, b: usize| {
-                products[lag] += scale * terms[a].residual * terms[b].residual;
-                followed[lag] += leverages[a].dot(&leverages[b]);
-                counts[lag] += 1.0;
-            };
-            (0..terms.len()).for_each(|k| add(NONE, k, k));
-            Raster::new(terms).for_pairs(add);
+            let raster = Raster::new(terms);
+            let add = |sums: &mut [f64; LAGS], scale: f64, plane: &[f64]| add_products(sums, scale, plane, &raster);
+            add(&mut products, scale, &raster.plane(|k| terms[k].residual));
+            (0..PARAMETERS).for_each(|i| add(&mut followed, 1.0, &raster.plane(|k| leverages[k][i])));
+            add(&mut counts, 1.0, &raster.plane(|_| 1.0));
         }
         let mean = |sums: &[f64; LAGS], lag: usize| if counts[lag] > 0.0 { sums[lag] / counts[lag] } else { 0.0 };
         let all = |sums: &[f64; LAGS]| mean(sums, NONE) + 2.0 * (NONE + 1..LAGS).map(|l| mean(sums, l)).sum::<f64>();
@@ -107,18 +107,37 @@ fn at_least(share: f64, white: [f64; 3], found: [f64; 3]) -> [f64; 3] {
     [m[(0, 0)], m[(0, 1)], m[(1, 1)]]
 }
 
+/// Adds the sum of the products of every two values at each lag.
+fn add_products(sums: &mut [f64; LAGS], scale: f64, plane: &[f64], raster: &Raster) {
+    wide(
+        #[inline(always)]
+        || {
+            for (lag, sum) in sums.iter_mut().enumerate().skip(NONE) {
+                let ahead = &plane[raster.ahead(lag)..];
+                *sum += scale * sum_of_products(&plane[..ahead.len()], ahead);
+            }
+        },
+    );
+}
+
 /// uu, uv and vv of a corner's terms at a noise of 1.
 fn sum(terms: &[Term], noise: &Correlation) -> [f64; 3] {
-    let mut sum = [0.0; 3];
-    let mut add = |weight: f64, a: &Term, b: &Term| {
-        let ([p, q], [r, s]) = (a.influence, b.influence);
-        sum[0] += weight * p * r;
-        sum[1] += weight * 0.5 * (p * s + q * r);
-        sum[2] += weight * q * s;
-    };
-    terms.iter().for_each(|t| add(noise.0[NONE], t, t));
-    Raster::new(terms).for_pairs(|lag, a, b| add(2.0 * noise.0[lag], &terms[a], &terms[b]));
-    sum
+    let raster = Raster::new(terms);
+    let [u, v] = [0, 1].map(|axis| raster.plane(|k| terms[k].influence[axis]));
+    // Of each lag and its opposite, one stands for both.
+    let mut moved = [&u, &v].map(|plane| vec![0.0; plane.len()]);
+    wide(
+        #[inline(always)]
+        || {
+            for (lag, correlation) in noise.0.iter().enumerate().skip(NONE) {
+                let (ahead, weight) = (raster.ahead(lag), if lag == NONE { *correlation } else { 2.0 * correlation });
+                add_scaled(&mut moved[0], &u[ahead..], weight);
+                add_scaled(&mut moved[1], &v[ahead..], weight);
+            }
+            let mixed = sum_of_products(&u, &moved[1]) + sum_of_products(&v, &moved[0]);
+            [sum_of_products(&u, &moved[0]), 0.5 * mixed, sum_of_products(&v, &moved[1])]
+        },
+    )
 }
 
 #[cfg(test)]

@@ -42,6 +42,17 @@ impl<'a> Raster<'a> {
         (*cell as usize).checked_sub(1)
     }
 
+    /// A value of every term at its place, 0 where the window has no pixel: two planes, the second from `ahead(lag)` on, hold the values of every
+    /// two terms at that lag beside each other.
+    pub fn plane(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
+        self.cells.iter().map(|cell| (*cell as usize).checked_sub(1).map_or(0.0, &value)).collect()
+    }
+
+    /// Places from a term to that at a lag, not before that of none.
+    pub fn ahead(&self, lag: usize) -> usize {
+        lag / SIDE * self.width as usize + lag % SIDE - NONE
+    }
+
     /// Calls `pair` with the index of a lag that is not zero and those of every two terms at it.
     pub fn for_pairs(&self, mut pair: impl FnMut(usize, usize, usize)) {
         for (k, term) in self.terms.iter().enumerate() {
