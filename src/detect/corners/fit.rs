@@ -5,7 +5,7 @@ use super::model::{
     STEP_SLOPE, THETA, Vector,
 };
 use super::refusal::Refusal;
-use crate::detect::Picture;
+use super::smooth::Source;
 use crate::linalg::wide;
 
 const MAX_STEPS: usize = 30;
@@ -127,13 +127,12 @@ pub(super) struct Term {
 }
 
 /// Fits the model around a seed: roughly to the nearer pixels, then to all.
-pub(super) fn refine(picture: &Picture, seed: &Seed, window: Window, look: Look) -> Result<Saddle, Refusal> {
-    let pixels = Pixels::within(picture, seed, window)?;
+pub(super) fn refine(source: &Source, seed: &Seed, window: Window, look: Look) -> Result<Saddle, Refusal> {
+    let pixels = Pixels::within(source, seed, window)?;
     let guess = start(seed, &pixels, look);
     let contrast = guess[STEP];
-    let full_scale = f64::from(picture.full_scale);
-    let mut problem =
-        Problem { pixels, look, noise: START_NOISE * contrast.abs(), contrast, full_scale, level_slope: SLOPE_PER_PX };
+    let (noise, full_scale) = (START_NOISE * contrast.abs(), source.full_scale());
+    let mut problem = Problem { pixels, look, noise, contrast, full_scale, level_slope: SLOPE_PER_PX };
     let near = problem.pixels.near;
     let rough = problem.minimise(problem.at(&guess, near), near, ROUGH)?;
     problem.noise = problem.noise_of(rough.sum.squares, &rough, near);
@@ -484,20 +483,17 @@ fn dot(a: &[f64; LANES], b: &[f64; LANES]) -> f64 {
 }
 
 impl Pixels {
-    fn within(picture: &Picture, seed: &Seed, window: Window) -> Result<Self, Refusal> {
+    fn within(source: &Source, seed: &Seed, window: Window) -> Result<Self, Refusal> {
         let [[ax, ay], [bx, by]] = seed.sides;
         let area = ax * by - ay * bx;
         if area.abs() < LEAST_CROSSING * ax.hypot(ay) * bx.hypot(by) {
             return Err(Refusal::Oblique);
         }
         let [cx, cy] = seed.uv;
-        let (last_x, last_y) = (picture.width as f64 - 1.0, picture.height as f64 - 1.0);
+        let (last_x, last_y) = (source.picture().width as f64 - 1.0, source.picture().height as f64 - 1.0);
         if cx.min(cy).min(last_x - cx).min(last_y - cy) < LEAST_MARGIN_PX {
             return Err(Refusal::AtTheEdge);
         }
-        let low = |c: f64| (c - window.radius_px).ceil().max(0.0);
-        let high = |c: f64, last: f64| (c + window.radius_px).floor().min(last);
-        let (x1, y1) = (high(cx, last_x), high(cy, last_y));
         // Distance from the edges per unit of the coordinates p and q.
         let (from_b, from_a) = (area.abs() / bx.hypot(by), area.abs() / ax.hypot(ay));
         let near_px = (0.5 * window.radius_px).powi(2);
@@ -505,23 +501,24 @@ impl Pixels {
         let off = window.dot + window.keep_off_px / seed.side_px();
         let free =
             |p: f64, q: f64| window.dot == 0.0 || ((p.abs() - 0.5).hypot(q) >= off && p.hypot(q.abs() - 0.5) >= off);
+        // All that may be within reach along the edges.
+        let extent = |a: f64, b: f64| (reach * (a.abs() + b.abs()) + 1.0).min(window.radius_px);
+        let range = |c: f64, extent: f64, last: f64| {
+            (c - extent).ceil().max(0.0) as usize..=(c + extent).floor().min(last) as usize
+        };
+        let (columns, rows) = (range(cx, extent(ax, bx), last_x), range(cy, extent(ay, by), last_y));
+        let patch = source.patch(columns.clone(), rows.clone());
         let (mut nearer, mut farther) = (Vec::new(), Vec::new());
-        let mut y = low(cy);
-        while y <= y1 {
-            let mut x = low(cx);
-            while x <= x1 {
-                let (dx, dy) = (x - cx, y - cy);
-                let (p, q) = ((dx * by - dy * bx) / area, (dy * ax - dx * ay) / area);
-                let near = dx * dx + dy * dy <= window.radius_px * window.radius_px;
-                let on_arm = (p.abs() - window.arm) * from_b <= -window.keep_off_px
-                    || (q.abs() - window.arm) * from_a <= -window.keep_off_px;
-                if near && on_arm && free(p, q) && p.abs() <= reach && q.abs() <= reach {
-                    let pixel = [dx, dy, f64::from(picture.at(x as usize, y as usize))];
-                    if dx * dx + dy * dy <= near_px { nearer.push(pixel) } else { farther.push(pixel) }
-                }
-                x += 1.0;
+        for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {
+            let (dx, dy) = (x as f64 - cx, y as f64 - cy);
+            let (p, q) = ((dx * by - dy * bx) / area, (dy * ax - dx * ay) / area);
+            let near = dx * dx + dy * dy <= window.radius_px * window.radius_px;
+            let on_arm = (p.abs() - window.arm) * from_b <= -window.keep_off_px
+                || (q.abs() - window.arm) * from_a <= -window.keep_off_px;
+            if near && on_arm && free(p, q) && p.abs() <= reach && q.abs() <= reach {
+                let pixel = [dx, dy, f64::from(patch.at(x, y))];
+                if dx * dx + dy * dy <= near_px { nearer.push(pixel) } else { farther.push(pixel) }
             }
-            y += 1.0;
         }
         let count = nearer.len() + farther.len();
         if count < 2 * PARAMETERS { Err(Refusal::TooFewPixels) } else { Ok(Self::of(&nearer, &farther)) }

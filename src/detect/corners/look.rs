@@ -4,12 +4,10 @@
 //! steeper edges was sharpened, or taken apart and put together by a codec. What such an edge looks like in its samples depends on where in
 //! a pixel it lies. Such a picture is smoothed first, which adds a known blur and takes away what lies beyond the sampling limit.
 
-use std::borrow::Cow;
-
 use super::fit::{Look, Saddle, Seed, Window, refine};
 use super::neighbours::{REACH, seed};
 use super::refusal::Refusal;
-use super::smooth::smoothed;
+use super::smooth::Source;
 use crate::detect::Picture;
 use crate::detect::board_labels::Lattice;
 
@@ -28,18 +26,16 @@ const LEAST_HALO: f64 = 0.1;
 
 /// A picture as the corners are fitted in it.
 pub(super) struct Sight<'a> {
-    picture: Cow<'a, Picture>,
+    source: Source<'a>,
     window: Window,
     look: Look,
-    /// Sigma of the smoothing, if any, px.
-    pub smoothing_px: Option<f64>,
 }
 
 impl<'a> Sight<'a> {
     /// Looks at some corners of a lattice.
     pub fn of(picture: &'a Picture, lattice: &Lattice, window: Window) -> Self {
         let seeds = samples(lattice);
-        let mut sight = Self { picture: Cow::Borrowed(picture), window, look: START, smoothing_px: None };
+        let mut sight = Self { source: Source::plain(picture), window, look: START };
         let fits = sight.sample(&seeds);
         // A corner that cannot be fitted as it is counts as too steep.
         let steep = seeds.len() - fits.iter().filter(|s| !is_steep(s)).count();
@@ -52,20 +48,25 @@ impl<'a> Sight<'a> {
 
     /// The same picture smoothed.
     pub fn smoothed(self, lattice: &Lattice) -> Self {
-        let picture = Cow::Owned(smoothed(&self.picture, SMOOTHING_PX));
-        let mut sight = Self { picture, smoothing_px: Some(SMOOTHING_PX), look: START, ..self };
+        let source = Source::smoothed(self.source.picture(), SMOOTHING_PX);
+        let mut sight = Self { source, look: START, ..self };
         sight.look = usual(&sight.sample(&samples(lattice)));
         sight
     }
 
+    /// Sigma of the smoothing, if any, px.
+    pub fn smoothing_px(&self) -> Option<f64> {
+        self.source.smoothing_px
+    }
+
     /// Whether a corner whose fit does not converge may do so once the picture is smoothed: it was sharpened.
     pub fn may_be_smoothed(&self) -> bool {
-        self.look.halo && self.smoothing_px.is_none()
+        self.look.halo && self.smoothing_px().is_none()
     }
 
     /// Whether neighbouring pixels have noise in common: the picture was sharpened or smoothed.
     pub fn has_correlated_noise(&self) -> bool {
-        self.look.halo || self.smoothing_px.is_some()
+        self.look.halo || self.smoothing_px().is_some()
     }
 
     fn sample(&self, seeds: &[Seed]) -> Vec<Saddle> {
@@ -74,7 +75,7 @@ impl<'a> Sight<'a> {
 
     /// Fits a corner.
     pub fn fit(&self, seed: &Seed) -> Result<Saddle, Refusal> {
-        refine(&self.picture, seed, self.window, self.look)
+        refine(&self.source, seed, self.window, self.look)
     }
 }
 

@@ -69,7 +69,7 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
     }
     detection.outline = outline(picture, &kept, placement);
     let correlation = match view.has_correlated_noise() {
-        true => Correlation::of(&some(&kept), view.smoothing_px),
+        true => Correlation::of(&some(&kept), view.smoothing_px()),
         false => Correlation::WHITE,
     };
     for (key, saddle) in kept {
