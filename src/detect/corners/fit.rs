@@ -6,6 +6,7 @@ use super::model::{
 };
 use super::refusal::Refusal;
 use super::smooth::Source;
+use super::sums::{RunningSums, Sum};
 use crate::linalg::wide;
 
 const MAX_STEPS: usize = 30;
@@ -138,7 +139,8 @@ pub(super) fn refine(source: &Source, seed: &Seed, window: Window, look: Look) -
     problem.noise = problem.noise_of(rough.sum.squares, &rough, near);
     problem.contrast = rough.state[STEP];
     let all = problem.pixels.all;
-    let usual = problem.minimise(problem.at(&rough.state, all), all, FINE)?;
+    let start = if near.blocks == all.blocks { rough } else { problem.at(&rough.state, all) };
+    let usual = problem.minimise(start, all, FINE)?;
     let end = problem.lit(usual)?;
     problem.finish(seed, end)
 }
@@ -193,14 +195,6 @@ struct Problem {
     full_scale: f64,
     /// Prior sigma of the slope of the level, share of the contrast per px.
     level_slope: f64,
-}
-
-/// Sums over the pixels at a state: normal matrix (lower triangle), right side, squares of the residuals.
-#[derive(Clone, Copy)]
-struct Sum {
-    normal: [[f64; PARAMETERS]; PARAMETERS],
-    right: [f64; PARAMETERS],
-    squares: f64,
 }
 
 /// A state with the sums there.
@@ -270,7 +264,7 @@ impl Problem {
         let Some(factor) = self.with_priors(point).0.cholesky() else { return 0.0 };
         let sigma = self.level_slope * self.contrast.abs();
         let of = |i: usize| {
-            let variance = factor.solve(&Vector::from_fn(|k, _| if k == i { 1.0 } else { 0.0 }))[i];
+            let variance = factor.solve(&unit(i))[i];
             let open = 1.0 - variance * (self.noise / sigma).powi(2);
             point.state[i].abs() / (sigma * open.max(f64::EPSILON).sqrt())
         };
@@ -313,14 +307,18 @@ impl Problem {
     /// Noise of a pixel whose squares leave this sum at a minimum, counts. With the normal matrix `N` of the pixels and `W` of the priors the
     /// fit takes `tr((N + W)^-1 N)` of them, not one a parameter: priors hold most slopes.
     fn noise_of(&self, squares: f64, point: &Point, part: Part) -> f64 {
-        let held = |inverse: Matrix| self.priors().iter().map(|&(i, weight, _)| weight * inverse[(i, i)]).sum::<f64>();
         let (normal, _, _) = self.with_priors(point);
-        let taken = PARAMETERS as f64 - normal.cholesky().map_or(0.0, |factor| held(factor.inverse()));
+        let held = normal.cholesky().map_or(0.0, |factor| {
+            let variance =
+                |i: usize| factor.l_dirty().solve_lower_triangular(&unit(i)).map_or(0.0, |x| x.norm_squared());
+            self.priors().iter().map(|&(i, weight, _)| weight * variance(i)).sum()
+        });
+        let taken = PARAMETERS as f64 - held;
         (squares / (part.pixels as f64 - taken)).sqrt()
     }
 
     fn at(&self, state: &Vector, part: Part) -> Point {
-        let mut sum = Sum { normal: [[0.0; PARAMETERS]; PARAMETERS], right: [0.0; PARAMETERS], squares: 0.0 };
+        let mut sums = RunningSums::ZERO;
         let edges = Edges::new(state, self.look.halo);
         let mut predicted = Prediction::NONE;
         wide(
@@ -328,11 +326,11 @@ impl Problem {
             || {
                 for block in &self.pixels.blocks[..part.blocks] {
                     edges.predict(block, &mut predicted);
-                    sum.add(block, &predicted, self.full_scale);
+                    sums.add(block, &predicted, self.full_scale);
                 }
             },
         );
-        Point { state: *state, sum }
+        Point { state: *state, sum: sums.total() }
     }
 
     fn finish(self, seed: &Seed, end: Point) -> Result<Saddle, Refusal> {
@@ -364,7 +362,10 @@ impl Problem {
         let edges = Edges::new(state, self.look.halo);
         let mut predicted = Prediction::NONE;
         for block in &self.pixels.blocks {
-            edges.predict(block, &mut predicted);
+            wide(
+                #[inline(always)]
+                || edges.predict(block, &mut predicted),
+            );
             for lane in (0..LANES).filter(|&lane| block.weight[lane] > 0.0) {
                 // A clipped pixel depends on nothing.
                 if predicted.value[lane] >= self.full_scale {
@@ -415,22 +416,20 @@ impl Saddle {
         let factor = self.problem.with_priors(&self.end).0.cholesky()?;
         let normal = &self.end.sum.normal;
         let of_pixels = Matrix::from_fn(|i, j| normal[i.max(j)][i.min(j)]);
-        let [u, v] = [0, 1].map(|axis| factor.solve(&Vector::from_fn(|i, _| if i == axis { 1.0 } else { 0.0 })));
+        let [u, v] = [0, 1].map(|axis| factor.solve(&unit(axis)));
         Some([u.dot(&(of_pixels * u)), u.dot(&(of_pixels * v)), v.dot(&(of_pixels * v))])
     }
 
     /// What each pixel adds to the corner, after the other parameters have been eliminated; none for a normal matrix without inverse.
     pub fn terms(&self) -> Vec<Term> {
         let Some(factor) = self.problem.with_priors(&self.end).0.cholesky() else { return Vec::new() };
-        let inverse = factor.inverse();
+        let columns = [0, 1].map(|axis| factor.solve(&unit(axis)));
         let mut terms = Vec::with_capacity(self.problem.pixels.all.pixels);
         self.problem.for_pixels(&self.end.state, |block, lane, predicted| {
-            let influence =
-                |i: usize| predicted.gradient.iter().zip(inverse.column(i).iter()).map(|(g, c)| g[lane] * c).sum();
             terms.push(Term {
                 at: [self.seed_uv[0] + block.x[lane], self.seed_uv[1] + block.y[lane]].map(|c| c.round() as i32),
                 residual: block.value[lane] - predicted.value[lane],
-                influence: [influence(0), influence(1)],
+                influence: columns.map(|column| predicted.gradient.iter().zip(&column).map(|(g, c)| g[lane] * c).sum()),
             });
         });
         terms
@@ -446,40 +445,6 @@ impl Saddle {
         });
         leverages
     }
-}
-
-impl Sum {
-    #[inline(always)]
-    fn add(&mut self, block: &Block, predicted: &Prediction, full_scale: f64) {
-        let (mut residual, mut open) = ([0.0; LANES], [0.0; LANES]);
-        for lane in 0..LANES {
-            let value = predicted.value[lane];
-            let clipped = value >= full_scale;
-            residual[lane] = block.weight[lane] * (block.value[lane] - if clipped { full_scale } else { value });
-            open[lane] = if clipped { 0.0 } else { block.weight[lane] };
-        }
-        self.squares += dot(&residual, &residual);
-        for i in 0..PARAMETERS {
-            let mut row = predicted.gradient[i];
-            row.iter_mut().zip(&open).for_each(|(g, open)| *g *= open);
-            self.right[i] += dot(&row, &residual);
-            for j in 0..=i {
-                self.normal[i][j] += dot(&row, &predicted.gradient[j]);
-            }
-        }
-    }
-}
-
-/// With sums in a fixed order, two lanes beside each other.
-#[inline(always)]
-fn dot(a: &[f64; LANES], b: &[f64; LANES]) -> f64 {
-    let mut sums = [0.0; 4];
-    for k in 0..LANES / 4 {
-        for lane in 0..4 {
-            sums[lane] += a[4 * k + lane] * b[4 * k + lane];
-        }
-    }
-    (sums[0] + sums[2]) + (sums[1] + sums[3])
 }
 
 impl Pixels {
@@ -556,6 +521,11 @@ fn shortened(share: f64, descent: f64, change: f64) -> f64 {
 /// Slope of an edge in its middle over that without halo.
 fn steepening(halo: f64) -> f64 {
     (1.0 + STEEPENING * halo).max(0.1)
+}
+
+/// 1 at one parameter, 0 at the others.
+fn unit(parameter: usize) -> Vector {
+    Vector::from_fn(|k, _| if k == parameter { 1.0 } else { 0.0 })
 }
 
 fn solve(normal: &Matrix, right: &Vector, damping: f64) -> Option<Vector> {

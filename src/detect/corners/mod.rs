@@ -11,6 +11,7 @@ mod refusal;
 mod rim;
 mod small_windows;
 mod smooth;
+mod sums;
 
 use std::collections::{BTreeMap, BTreeSet};
 
