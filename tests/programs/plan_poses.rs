@@ -386,6 +386,43 @@ fn further_poses_are_planned_from_a_result_with_its_noise() {
     assert!(code == 2 && error.contains("--joint-noise-mrad") && error.contains("--from"), "{code}: {error}");
 }
 
+/// The first numbers of a line in braces or brackets.
+fn values(line: &str, open: char) -> Vec<f64> {
+    let cells = line.split(open).nth(1).unwrap();
+    let number = |cell: &str| cell.trim_matches(|c: char| c.is_ascii_alphabetic() || "[]{};".contains(c)).to_owned();
+    let cell = |cell: &str| number(cell.split_whitespace().last().unwrap()).parse().unwrap();
+    cells.trim_end_matches(['}', ']', ';']).split(',').filter(|c| !c.trim().is_empty()).map(cell).collect()
+}
+
+/// A rail stands before the arm in the chain, and behind its axes in the languages of the makers.
+#[test]
+fn a_rail_is_an_external_axis_of_the_planned_programs() {
+    let mut request = request("ur10e", 4);
+    let chosen = plan(&request).unwrap();
+    request.setting.robot.chain.reading_kinds[0] = JointKind::Prismatic;
+    let files = robotcal::output::plan_programs::programs(&request, &chosen);
+    let text = |name: &str| String::from_utf8(files[&format!("robotcal_plan.{name}")].clone()).unwrap();
+    let first = &chosen.pool[chosen.legs[0].stop].readings;
+    let shown: Vec<f64> = first.iter().map(|q| q.to_degrees()).collect();
+    let rail_mm = 1e3 * first[0];
+    let near = |found: &[f64], wanted: &[f64]| {
+        assert_eq!(found.len(), wanted.len(), "{found:?} {wanted:?}");
+        assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-4), "{found:?} {wanted:?}");
+    };
+    let stop = chosen.legs[0].via.len();
+    let data = text("dat");
+    let line = data.lines().filter(|l| l.starts_with("DECL E6AXIS")).nth(stop).unwrap();
+    let axes: Vec<&str> = line.split(['{', '}', ',']).filter_map(|cell| cell.split_once(' ')).map(|c| c.0).collect();
+    assert_eq!(axes[1..], ["A1", "A2", "A3", "A4", "A5", "E1"], "{line}");
+    near(&values(line, '{'), &[&shown[1..], &[rail_mm]].concat());
+    let module = text("mod");
+    let line = module.lines().filter(|l| l.contains("CONST jointtarget")).nth(stop).unwrap();
+    let [arm, external] = [2, 3].map(|k| line.split('[').nth(k).unwrap());
+    near(&values(&format!("[{arm}"), '['), &[&shown[1..], &[0.0]].concat());
+    near(&values(&format!("[{external}"), '['), &[rail_mm, 9e9, 9e9, 9e9, 9e9, 9e9]);
+    assert!(!files.contains_key("robotcal_plan.script"));
+}
+
 #[test]
 fn names_cannot_become_statements_of_the_planned_programs() {
     let mut request = request("ur10e", 4);

@@ -1,21 +1,19 @@
 //! KUKA KRL: a .src with the motions and a .dat with the axis positions.
 
-use super::route::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, harmless};
+use super::route::{Axes, EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, harmless};
 
-/// Axes that KRL names A1.. and E1..
-const AXES: usize = 6;
-/// External axes.
+/// External axes, E1 and so on.
 const EXTERNAL: usize = 6;
 
 /// The .src; `None` for more axes than KRL has.
 pub(super) fn source(route: &Route<'_>) -> Option<String> {
-    if route.joints.len() > AXES + EXTERNAL {
+    if !route.is_of_six(EXTERNAL) {
         return None;
     }
     let mut text = format!(
         "&ACCESS RVP\nDEF {NAME}()\n; Joints in order: {}\n; Trigger: output 1. Slowly: 10 percent.\n\
          BAS(#INITMOV,0)\nBAS(#VEL_PTP,10)\n",
-        route.joint_list()
+        route.axis_list()
     );
     for (k, visit) in route.visits.iter().enumerate() {
         if let Purpose::MovePlate(place, _) = &visit.purpose {
@@ -33,14 +31,17 @@ pub(super) fn source(route: &Route<'_>) -> Option<String> {
 
 /// The .dat; `None` as for [`source`].
 pub(super) fn data(route: &Route<'_>) -> Option<String> {
-    if route.joints.len() > AXES + EXTERNAL {
+    if !route.is_of_six(EXTERNAL) {
         return None;
     }
-    let name = |k: usize| if k < AXES { format!("A{}", k + 1) } else { format!("E{}", k - AXES + 1) };
     let mut text = format!("&ACCESS RVP\nDEFDAT {NAME} PUBLIC\n");
     for (k, visit) in route.visits.iter().enumerate() {
-        let axes: Vec<String> =
-            route.shown(&visit.readings).iter().enumerate().map(|(j, q)| format!("{} {q:.5}", name(j))).collect();
+        let shown = route.shown(&visit.readings);
+        let Axes { arm, external } = route.by_axis(&shown);
+        let named = [("A", arm), ("E", external)].into_iter().flat_map(|(letter, values)| {
+            values.into_iter().enumerate().map(move |(k, q)| format!("{letter}{} {q:.5}", k + 1))
+        });
+        let axes: Vec<String> = named.collect();
         text += &format!("DECL E6AXIS XP{k}={{{}}}\n", axes.join(","));
     }
     Some(text + "ENDDAT\n")

@@ -1,24 +1,29 @@
 //! ABB RAPID: one module with joint targets.
 
-use super::route::{EXPOSE_S, PULSE_S, Purpose, Route, SETTLE_S, harmless};
+use super::route::{ARM_AXES, Axes, EXPOSE_S, PULSE_S, Purpose, Route, SETTLE_S, harmless};
 
-/// Axes of the arm in a joint target.
-const AXES: usize = 6;
+/// External axes in a joint target.
+const EXTERNAL: usize = 6;
 /// What RAPID writes for an external axis that is not there.
 const ABSENT: &str = "9E9";
 
 /// The module; `None` for more axes than a joint target has.
 pub(super) fn module(route: &Route<'_>) -> Option<String> {
-    if route.joints.len() > 2 * AXES {
+    if !route.is_of_six(EXTERNAL) {
         return None;
     }
     let mut targets = String::new();
     let mut body = String::new();
     for (k, visit) in route.visits.iter().enumerate() {
-        let mut cells: Vec<String> = route.shown(&visit.readings).iter().map(|q| format!("{q:.5}")).collect();
-        cells.resize(cells.len().max(AXES), "0".to_owned());
-        cells.resize(2 * AXES, ABSENT.to_owned());
-        let (arm, external) = cells.split_at(AXES);
+        let shown = route.shown(&visit.readings);
+        let axes = route.by_axis(&shown);
+        let cells = |values: Vec<&f64>, most: usize, absent: &str| {
+            let mut cells: Vec<String> = values.into_iter().map(|q| format!("{q:.5}")).collect();
+            cells.resize(most, absent.to_owned());
+            cells
+        };
+        let Axes { arm, external } =
+            Axes { arm: cells(axes.arm, ARM_AXES, "0"), external: cells(axes.external, EXTERNAL, ABSENT) };
         targets += &format!("  CONST jointtarget p{k} := [[{}],[{}]];\n", arm.join(","), external.join(","));
         if let Purpose::MovePlate(place, _) = &visit.purpose {
             let place = harmless(place);
@@ -32,7 +37,7 @@ pub(super) fn module(route: &Route<'_>) -> Option<String> {
             );
         }
     }
-    let joints = route.joint_list();
+    let joints = route.axis_list();
     Some(format!(
         "MODULE RobotcalPlan\n  ! Joints in order: {joints}\n{targets}  PROC robotcal_plan()\n{body}  ENDPROC\nENDMODULE\n"
     ))

@@ -30,6 +30,9 @@ pub(super) enum Purpose {
     MovePlate(String, String),
 }
 
+/// Axes of an arm in the languages of its maker; which of more are external, the description of the robot does not tell.
+pub(super) const ARM_AXES: usize = 6;
+
 /// One motion of the program.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Visit {
@@ -47,6 +50,17 @@ pub(super) struct Route<'a> {
     pub kinds: &'a [JointKind],
     pub visits: Vec<Visit>,
 }
+
+/// Readings of a visit as teach pendants show them, by the axes of the controller.
+pub(super) struct Axes<T> {
+    /// Of the arm, A1 and so on.
+    pub arm: Vec<T>,
+    /// External axes: a rail that carries the arm.
+    pub external: Vec<T>,
+}
+
+/// Prismatic joints before the arm that are a rail or a cross slide; three of them are the main axes of a gantry.
+const MOST_SLIDES: usize = 2;
 
 impl<'a> Route<'a> {
     /// The motions of a plan.
@@ -77,6 +91,28 @@ impl Route<'_> {
     /// Names of the joints for a comment.
     pub fn joint_list(&self) -> String {
         self.joints.iter().map(|j| harmless(j)).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Names of the joints for a comment, in the order of the axes of a controller.
+    pub fn axis_list(&self) -> String {
+        let Axes { arm, external } = self.by_axis(self.joints);
+        let names = |joints: Vec<&String>| joints.into_iter().map(|j| harmless(j)).collect::<Vec<_>>().join(", ");
+        let arm = names(arm);
+        if external.is_empty() { arm } else { format!("{arm}; external: {}", names(external)) }
+    }
+
+    /// What stands in the order of the joints, by axes.
+    pub fn by_axis<'a, T>(&self, all: &'a [T]) -> Axes<&'a T> {
+        let leading = self.kinds.iter().take_while(|kind| **kind == JointKind::Prismatic).count();
+        let slides = if leading <= MOST_SLIDES { leading } else { 0 };
+        let (external, arm) = all.split_at(slides.min(all.len()));
+        Axes { arm: arm.iter().collect(), external: external.iter().collect() }
+    }
+
+    /// True where the axes of the arm are no more than a controller of six has, so that each has its place.
+    pub fn is_of_six(&self, external: usize) -> bool {
+        let axes = self.by_axis(self.kinds);
+        axes.arm.len() <= ARM_AXES && axes.external.len() <= external
     }
 
     /// Readings as teach pendants show them: degrees, or mm.
