@@ -117,7 +117,7 @@ impl Choice {
         Some(MeasuredFrames {
             to: frames_of(to),
             from: from.as_ref().map(|f| frames_of(f)),
-            work_is_base: to.work_is_base(),
+            base_within: to.work_is_base().then_some((limits.same_tool_m, limits.same_work_rad)),
             tool: own.0,
             work: own.1,
             same_work: (limits.same_work_m, limits.same_work_rad),

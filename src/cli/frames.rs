@@ -26,6 +26,7 @@ use crate::output::frames_record::{
 };
 use crate::output::restore::{FoundModel, chain, found_model, robot_description};
 use crate::output::solution_json::SolutionRecord;
+use crate::output::work_findings::{from_below, other_frame};
 use crate::output::{ResultFolder, folder_name};
 use crate::problem::MeasuredSeries;
 use crate::series::{self, InputFile, Series};
@@ -90,7 +91,9 @@ pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
     }
     let subject = args.touches.first().unwrap_or(&args.from).display().to_string();
     let mistake = touch_mistake(&robot, &touches, &given, (&fitted, &found.limits));
-    let findings = findings((&fitted, mistake), &touches, (&found.limits, placement), &subject);
+    let mut findings = findings((&fitted, mistake), &touches, (&found.limits, placement), &subject);
+    findings.extend(other_frame(&record.robot.base, (&fitted, &work_name(&touches)), &found.limits, &subject));
+    findings.extend(from_below(robot.exported(), &fitted, &touches, &subject));
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
     let made = FramesRecord {
         format: FORMAT,

@@ -346,6 +346,7 @@ codes! {
         RobotContradicted "robot_contradicted" "touches say of the robot what the solution excludes",
         ToolContradicted "tool_contradicted" "the tool that was given is not where the touches have it",
         PlaceContradicted "place_contradicted" "a place that was touched is not where the other touches have it",
+        TouchedFromBelow "touched_from_below" "the tool came from below the plane of the touched places",
         WorkDisplaced "work_displaced" "the work object stands elsewhere from some touch on",
         FramesUnknown "frames_unknown" "base and tool of the real robot are known worse than the correction is large",
         FramesNominal "frames_nominal" "base and tool were taken as nominal, as asked for",

@@ -64,6 +64,7 @@ mod solution_record;
 pub mod stand_alone_files;
 mod text;
 pub mod verdict;
+pub mod work_findings;
 mod write;
 
 pub use compensation_read::{compensated, parse_compensation, read_compensation};

@@ -54,8 +54,8 @@ pub struct MeasuredFrames {
     pub to: RobotFrames,
     /// Of the robot on which it was taught; `None` for a program as it was planned, whose own frames count.
     pub from: Option<RobotFrames>,
-    /// True where places are given in the base itself, so that the nominal work object is the base, whatever the program's are.
-    pub work_is_base: bool,
+    /// Where the places are given in the base itself: distance and angle from the base of the model beyond which it is another frame, m and rad.
+    pub base_within: Option<(f64, f64)>,
     /// Tool of targets that are joint values, where it is known.
     pub tool: Option<Pose>,
     /// Their work object.
@@ -113,7 +113,18 @@ impl MeasuredFrames {
         let base = match (&self.to.work, self.from.as_ref().map(|f| f.work)) {
             (None, _) => Pose::identity(),
             (Some(to), Some(Some(from))) => *to * from.inverse(),
-            (Some(to), _) if self.work_is_base => *to,
+            (Some(to), _) if self.base_within.is_some() => {
+                let (rad, m) = to.distance(&Pose::identity());
+                if self.base_within.is_some_and(|within| m > within.0 || rad > within.1) {
+                    let words = format!(
+                        "the touched places are said to stand in the base, and their frame lies {:.0} mm and {:.1} degrees from it: name the frame that they stand in ([contact] frame)",
+                        1e3 * m,
+                        rad.to_degrees()
+                    );
+                    return Err(Why::new(LeftReason::FrameUnknown, words));
+                }
+                *to
+            }
             (Some(to), _) => {
                 let own = own_work.ok_or_else(|| {
                     let words = "the work object was measured, and the text does not tell which one these joints mean: give it with --work";

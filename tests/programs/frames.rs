@@ -247,6 +247,45 @@ fn a_program_with_measured_frames_brings_the_tool_where_it_was_meant() {
     assert_says(&other.said(), Code::SolutionDiffers, &["kuka_kr6_r900.urdf"]);
 }
 
+/// Places of a fixture under the name of the base would move the whole program by where the fixture stands.
+#[test]
+fn places_of_another_frame_than_the_base_are_told() {
+    let Files { folder, touches, .. } = files("base_link", Pose::from_xyz_rpy([0.09, 0.0, -0.06], [0.0; 3]), 5);
+    let [solution, touches] = [&repo(SOLUTION), &touches].map(|p| p.to_str().unwrap().to_owned());
+    let frames = folder.path().join("frames");
+    let run = robotcal(&["frames", "--from", &solution, "--touches", &touches], &frames).expect(1);
+    let record: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(frames.join("frames.json")).unwrap()).unwrap();
+    let found = &record["findings"][0];
+    assert_eq!(
+        (found["code"].as_str(), found["weight"].as_str()),
+        (Some("frames_differ"), Some("gate")),
+        "{}",
+        run.said()
+    );
+    let distance_mm = found["quantities"]["distance_mm"].as_f64().unwrap();
+    assert!((distance_mm - 108.2).abs() < 2.0, "{distance_mm}");
+    let program = folder.path().join("t.csv");
+    let world = world();
+    let row: Vec<String> = START.iter().map(f64::to_string).collect();
+    std::fs::write(&program, format!("{}\n{}\n", world.truth.chain.readings.join(","), row.join(","))).unwrap();
+    let path = |p: &str| repo(p).to_str().unwrap().to_owned();
+    let [nominal, urdf, compensation] = [
+        "robots/kuka_kr6_r900/kuka_kr6_r900.urdf",
+        "reports/kr6_small/kuka_kr6_r900.calibrated.urdf",
+        "reports/kr6_small/compensation.toml",
+    ]
+    .map(path);
+    let tool = format!("--tool={},{},{},0,0,0,1", TOOL[0], TOOL[1], TOOL[2]);
+    let file = frames.join("frames.json");
+    let mut args = vec!["compensate", program.to_str().unwrap(), "--nominal", &nominal, "--urdf", &urdf];
+    args.extend(["--compensation", &compensation, "--joint-unit", "rad", "--base", "base_link", "--tip", "tool0"]);
+    args.extend(["--frames", file.to_str().unwrap(), &tool]);
+    let done = robotcal(&args, &folder.path().join("out")).expect(1);
+    let left: Vec<String> = done.told().left.iter().map(|(_, _, reason)| reason.clone()).collect();
+    assert_eq!(left, ["frame_unknown"]);
+}
+
 /// Each bad input is refused with its file and place.
 #[test]
 fn bad_touches_are_refused_by_file_and_place() {

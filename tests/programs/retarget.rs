@@ -30,7 +30,7 @@ fn outcomes(name: &str, text: String, to: &Robot, from: &Chain, moved: Option<Po
     let frames = moved.map(|moved| MeasuredFrames {
         to: at(moved * work),
         from: Some(at(work)),
-        work_is_base: true,
+        base_within: None,
         tool: None,
         work: None,
         same_work: (0.0, 0.0),
