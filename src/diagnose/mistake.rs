@@ -20,6 +20,15 @@ pub enum MistakeKind {
         /// True where degrees are read as radians, else the other way round.
         are_degrees: bool,
     },
+    /// Readings of a prismatic joint are in another unit than metres.
+    SlideUnit {
+        /// The joint.
+        joint: String,
+        /// The unit, in the plural.
+        unit: &'static str,
+        /// Metres of one of them.
+        metres: f64,
+    },
     /// A joint is counted together with the one before it, as where it is counted from the ground.
     Coupled {
         /// The joint, and the one before it.
@@ -42,6 +51,8 @@ pub enum MistakeKind {
         angle_rad: f64,
         /// Of the distances, m.
         distance_m: f64,
+        /// A prismatic joint that reads the same at all stops.
+        constant: Option<String>,
     },
     /// The plate has another size.
     PlateSize {
@@ -84,6 +95,7 @@ impl Mistake {
                 joints
             }
             MistakeKind::Unit { joint, .. } => joint.as_slice(),
+            MistakeKind::SlideUnit { joint, .. } => std::slice::from_ref(joint),
             MistakeKind::Coupled { joints, .. } => &joints[..1],
             _ => &[],
         }
@@ -99,7 +111,7 @@ impl Kind for Mistake {
         match &self.kind {
             MistakeKind::Signs(_) => Code::JointSignWrong,
             MistakeKind::Columns(_) | MistakeKind::Reversed(_) => Code::JointOrderWrong,
-            MistakeKind::Unit { .. } => Code::JointUnitWrong,
+            MistakeKind::Unit { .. } | MistakeKind::SlideUnit { .. } => Code::JointUnitWrong,
             MistakeKind::Coupled { .. } => Code::JointCoupled,
             MistakeKind::Rows { .. } => Code::RowsShifted,
             MistakeKind::Mount(_) => Code::CameraMountWrong,
@@ -124,7 +136,7 @@ impl Kind for Mistake {
         let mut all = vec![Quantity::new("misfit", self.misfit, "rad + m")];
         all.extend(self.misfit_undone.map(|left| Quantity::new("misfit_undone", left, "rad + m")));
         match self.kind {
-            MistakeKind::Lengths { angle_rad, distance_m } => {
+            MistakeKind::Lengths { angle_rad, distance_m, .. } => {
                 all.extend([Quantity::new("angle", angle_rad, "rad"), Quantity::new("distance", distance_m, "m")]);
             }
             MistakeKind::PlateSize { scale, pitch_m } => {
@@ -170,6 +182,9 @@ impl Kind for Mistake {
             MistakeKind::Unit { joint: None, are_degrees } => {
                 format!("write joint_unit = \"{}\" in series.toml", unit(*are_degrees)[2])
             }
+            MistakeKind::SlideUnit { joint, metres, .. } => {
+                format!("multiply the column {joint} of joints.csv by {metres}: prismatic joints are metres")
+            }
             MistakeKind::Coupled { joints: [joint, before], is_sum } => {
                 let word = if *is_sum { "plus" } else { "minus" };
                 format!("write {joint} {word} {before} into the column {joint} of joints.csv")
@@ -186,7 +201,10 @@ impl Kind for Mistake {
                 let word = if *mount == CameraMount::Hand { "hand" } else { "fixed" };
                 format!("write camera_mount = \"{word}\" in series.toml")
             }
-            MistakeKind::Lengths { .. } => {
+            MistakeKind::Lengths { constant: Some(joint), .. } => format!(
+                "look whether {joint} moved between the stops: write its readings into joints.csv; if it stood still, check that the URDF is of this robot and size, with lengths in metres"
+            ),
+            MistakeKind::Lengths { constant: None, .. } => {
                 "check that the URDF is of this robot and size, with lengths in metres, and that the tip link carries the camera".into()
             }
             MistakeKind::PlateSize { .. } => {
@@ -229,6 +247,9 @@ impl Mistake {
                 let values = joint.as_ref().map_or("the joint values".into(), |j| format!("the readings of {j} alone"));
                 format!("{values} are {is}, read as {read_as}: converted, the images fit")
             }
+            MistakeKind::SlideUnit { joint, unit, .. } => {
+                format!("the readings of {joint} are {unit}, read as metres: converted, the images fit")
+            }
             MistakeKind::Coupled { joints: [joint, before], is_sum } => format!(
                 "the controller counts {joint} together with {before}, as where J3 is counted from the ground: with {joint} {} {before} the images fit",
                 if *is_sum { "plus" } else { "minus" }
@@ -247,12 +268,17 @@ impl Mistake {
             MistakeKind::Mount(CameraMount::Fixed) => {
                 "the camera stands still and the plate is in the hand: read so, the images fit".into()
             }
-            MistakeKind::Lengths { angle_rad, distance_m } => format!(
-                "directions fit the joint readings (median {:.1} mrad), distances do not (median {:.0} mm): these are the axes of \
-                 such an arm with other link lengths",
-                1e3 * angle_rad,
-                1e3 * distance_m
-            ),
+            MistakeKind::Lengths { angle_rad, distance_m, constant } => {
+                let fit = format!(
+                    "directions fit the joint readings (median {:.1} mrad), distances do not (median {:.0} mm)",
+                    1e3 * angle_rad,
+                    1e3 * distance_m
+                );
+                match constant {
+                    Some(joint) => format!("{fit}, and {joint} reads the same at all stops"),
+                    None => format!("{fit}: these are the axes of such an arm with other link lengths"),
+                }
+            }
             MistakeKind::PlateSize { scale, pitch_m } => format!(
                 "the plate is {scale:.3} times as large as plate.toml says, judged by the link lengths in the URDF (a pitch of {:.3} mm instead of {:.3} mm fits), \
                  or else the robot is {:.3} times as large as the URDF",

@@ -7,6 +7,9 @@ use crate::urdf::JointKind;
 /// The readings of all stops with one mistake undone, and its name.
 pub(super) type Undone = (Vec<Vec<f64>>, MistakeKind);
 
+/// Units that lengths are recorded in, and metres of each.
+const LENGTHS: [(&str, f64); 3] = [("millimetres", 1e-3), ("centimetres", 1e-2), ("inches", 0.0254)];
+
 /// Every one of a single joint, of two or three, of all, and of rows.
 pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> {
     let (names, kinds) = (&robot.chain.readings, &robot.chain.reading_kinds);
@@ -34,6 +37,11 @@ pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> 
             for (is_sum, sign) in [(true, 1.0), (false, -1.0)] {
                 let joints = [k, k - 1].map(|joint| names[joint].clone());
                 add(MistakeKind::Coupled { joints, is_sum }, &|q| q[k] += sign * q[k - 1]);
+            }
+        }
+        if kinds[k] == JointKind::Prismatic {
+            for (unit, metres) in LENGTHS {
+                add(MistakeKind::SlideUnit { joint: names[k].clone(), unit, metres }, &|q| q[k] *= metres);
             }
         }
         if kinds[k] == JointKind::Revolute {

@@ -10,6 +10,7 @@ use crate::init::{PosePair, SeenStop, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
 use crate::series::{CameraMount, spread};
+use crate::urdf::JointKind;
 
 /// Images of one camera mounting and one plate placement with what they say.
 pub(super) struct Suspects<'a> {
@@ -119,7 +120,16 @@ impl Suspects<'_> {
         distances.sort_by(f64::total_cmp);
         let (angle_rad, distance_m) = (angles[angles.len() / 2], distances[distances.len() / 2]);
         (angle_rad < self.limits.suspicious_misfit && distance_m > self.limits.other_lengths_m)
-            .then_some(MistakeKind::Lengths { angle_rad, distance_m })
+            .then(|| MistakeKind::Lengths { angle_rad, distance_m, constant: self.constant_slide() })
+    }
+
+    /// A prismatic joint that reads the same at all stops.
+    fn constant_slide(&self) -> Option<String> {
+        let (chain, readings) = (&self.robot.chain, self.readings());
+        let is_constant = |k: usize| readings.windows(2).all(|pair| pair[0].get(k) == pair[1].get(k));
+        let slides = chain.reading_kinds.iter().zip(&chain.readings).enumerate();
+        let mut constant = slides.filter(|(k, (kind, _))| **kind == JointKind::Prismatic && is_constant(*k));
+        constant.next().map(|(_, (_, name))| name.clone())
     }
 
     fn wrong_scale(&self) -> Option<(f64, MistakeKind)> {

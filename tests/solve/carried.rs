@@ -169,5 +169,13 @@ fn mistakes_in_what_stands_beside_the_arm_are_named() {
         assert_says(&shifted, Code::RowsShifted, &names);
         let sign = named(cell, &|rows| rows.iter_mut().for_each(|q| q[n - 2] = -q[n - 2]));
         assert_says(&sign, Code::JointSignWrong, &[cell.known.readings[n - 2].as_str()]);
+        if cell.name == "rail" {
+            for unit_m in [1e-3, 1e-2, 0.0254] {
+                let unit = named(cell, &|rows| rows.iter_mut().for_each(|q| q[0] /= unit_m));
+                assert_eq!((unit.code, unit.place.as_str()), (Code::JointUnitWrong, names[0]), "{unit_m}: {unit}");
+            }
+            let constant = named(cell, &|rows| rows.iter_mut().for_each(|q| q[0] = 0.0));
+            assert_says(&constant, Code::LinkLengthsWrong, &names);
+        }
     }
 }
