@@ -145,7 +145,8 @@ fn refuse_units(table: &Table, kind: RotationKind, poses: &[&Written]) -> Result
             "{far} of {} flanges are more than {FARTHEST_M} m from the base (up to {farthest:.1})",
             poses.len()
         );
-        let remedy = "x_m, y_m, z_m are metres: divide them by 1000 if they are millimetres";
+        let remedy =
+            "x_m, y_m, z_m are metres: divide them by 1000 if they are millimetres, by 100 if they are centimetres";
         return Err(Error::new(Code::MillimetresAsMetres, place, what, remedy));
     }
     let is_rad = matches!(kind, RotationKind::RotationVector | RotationKind::Rpy);
@@ -166,7 +167,8 @@ fn as_written(poses: &[Option<Written>]) -> Vec<Option<Pose>> {
 
 /// The same table read with one mistake undone, for each mistake that is usual.
 fn otherwise(kind: RotationKind, poses: &[Option<Written>]) -> Vec<ReadOtherwise> {
-    let mut all = vec![ReadOtherwise::inverted(&as_written(poses), None)];
+    let written = as_written(poses);
+    let mut all = vec![ReadOtherwise::inverted(&written, None), ReadOtherwise::turned_back(&written)];
     for (name, remedy, rotation) in other_rotations(kind) {
         let one = |p: &Written| Some(Pose::new(rotation(&p.numbers)?, p.position_m));
         let read: Vec<Option<Pose>> = poses.iter().map(|p| p.as_ref().and_then(one)).collect();

@@ -43,6 +43,14 @@ impl ReadOtherwise {
         Self { code: Code::RotationConvention, what, remedy, poses }
     }
 
+    /// Rotations of the base in the flange beside positions of the flange in the base.
+    pub(super) fn turned_back(poses: &[Option<Pose>]) -> Self {
+        let what = "the rotations in controller.csv are those of the base in the flange: with them inverted, and the positions as they are, the images fit".to_owned();
+        let remedy = "invert the rotations alone: negate qx, qy and qz (rx, ry, rz), transpose a matrix".to_owned();
+        let poses = poses.iter().map(|p| p.map(|p| Pose::new(p.rotation.transpose(), p.translation))).collect();
+        Self { code: Code::PosesInverted, what, remedy, poses }
+    }
+
     /// Poses of the base in the flange, where those of the flange in the base are wanted.
     pub(super) fn inverted(poses: &[Option<Pose>], convention: Option<&str>) -> Self {
         let read = convention.map_or_else(String::new, |name| format!(" and their rotations as {name}"));

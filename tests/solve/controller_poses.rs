@@ -162,17 +162,20 @@ fn mistakes_in_poses_are_named() {
     // A few stops are enough to tell, and every hypothesis costs time.
     let poses: Vec<_> = poses(&truth(), 7).into_iter().take(14).collect();
     let inverted: Vec<_> = poses.iter().map(|(i, p)| (i.clone(), p.inverse())).collect();
+    let turned_back = |(i, p): &(String, Pose)| (i.clone(), Pose::new(p.rotation.transpose(), p.translation));
+    let turned_back: Vec<_> = poses.iter().map(turned_back).collect();
     let far: Vec<_> = poses.iter().map(|(i, p)| (i.clone(), Pose::new(p.rotation, p.translation * 1e3))).collect();
     let first = |p: &Pose| {
         let [x, y, z, w] = p.quaternion_xyzw();
         vec![w, x, y, z]
     };
-    let cases: [(TempDir, Code, &str); 6] = [
+    let cases: [(TempDir, Code, &str); 7] = [
         (series("quaternion", "qx,qy,qz,qw", &poses, first), Code::RotationConvention, "qw"),
         (series("rpy_rad", "roll,pitch,yaw", &poses, rotation_vector), Code::RotationConvention, "rotvec_rad"),
         (series("wpr_deg", "w,p,r", &poses, abc_deg), Code::RotationConvention, "abc_deg"),
         (series("abc_deg", "a,b,c", &poses, zyz_deg), Code::RotationConvention, "zyz_deg"),
-        (series("quaternion", "qx,qy,qz,qw", &inverted, quaternion), Code::PosesInverted, "inverted"),
+        (series("quaternion", "qx,qy,qz,qw", &inverted, quaternion), Code::PosesInverted, "every pose"),
+        (series("quaternion", "qx,qy,qz,qw", &turned_back, quaternion), Code::PosesInverted, "rotations alone"),
         (series("quaternion", "qx,qy,qz,qw", &far, quaternion), Code::MillimetresAsMetres, "1000"),
     ];
     for (folder, code, part) in cases {
