@@ -179,10 +179,14 @@ fn next(r: &SolutionRecord, verdict: &Verdict, most: usize) -> Vec<String> {
     if !verdict.remedies.is_empty() {
         return shared("next      ", &verdict.remedies, most);
     }
+    let mastering = r.offsets_in_mastering.then(|| ENTER_MASTERING.to_owned());
     let size = r.hangs_on_a_stated_size().then(|| MEASURE_THE_PLATE.to_owned());
     let stops = r.identifiability.iter().flat_map(|found| &found.next).map(|a| advice(r, a));
-    size.into_iter().chain(stops).map(|words| indented("next", &words)).take(most).collect()
+    mastering.into_iter().chain(size).chain(stops).map(|words| indented("next", &words)).take(most).collect()
 }
+
+/// Where joint offsets are not in the corrected URDF.
+const ENTER_MASTERING: &str = "enter mastering.csv in the controller first: joint offsets are not in the URDF";
 
 /// Where its size stands in its file alone.
 const MEASURE_THE_PLATE: &str = "measure the plate (give [scale]): 0.1 % off its stated size is 1 mm a metre";

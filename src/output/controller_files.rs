@@ -101,10 +101,13 @@ pub(super) fn mastering_csv(solution: &Solution, context: &Context) -> String {
         let column = solution.fit.problem.layout.find(&format!("robot/{name}.offset"));
         let sigma = column.map_or(f64::NAN, |c| solution.fit.covariance.reduced[(c, c)].max(0.0).sqrt());
         let prior = column.map_or(f64::NAN, |c| solution.fit.problem.layout.columns[c].prior_sigma);
-        let determined = if is_determined(offsets[reading], sigma, prior, prismatic) { "yes" } else { "no" };
+        let is_held = column.is_none_or(|c| !solution.fit.problem.layout.columns[c].free);
+        let determined =
+            if !is_held && is_determined(offsets[reading], sigma, prior, prismatic) { "yes" } else { "no" };
         let folded = if context.offsets == Offsets::Folded { "yes" } else { "no" };
         let numbers = [offsets[reading], sigma].map(|v| format!("{:.6}", v * factor + 0.0));
         let [offset, sigma] = numbers;
+        let sigma = if is_held { String::new() } else { sigma };
         rows.push(vec![name.clone(), offset, sigma, unit.into(), determined.into(), folded.into()]);
     }
     let note = match context.offsets {
@@ -118,7 +121,7 @@ pub(super) fn mastering_csv(solution: &Solution, context: &Context) -> String {
     format!(
         "# Joint offsets for the mastering (zero point) table of the controller: where it shows the angle q, the joint stands at q + offset,\n\
          # so that after the correction it has to show q + offset. Not determined (no): known only together with base, tool\n\
-         # or the origins beside it, or within twice its sigma of none and that sigma beyond 0.5 mrad (0.05 mm); leave it.\n{note}{}",
+         # or the origins beside it, or within twice its sigma of none and that sigma beyond 0.5 mrad (0.05 mm); leave it. Without a sigma: held, not estimated.\n{note}{}",
         csv(&rows)
     )
 }

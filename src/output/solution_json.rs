@@ -398,6 +398,9 @@ pub struct SolutionRecord {
     /// earlier versions.
     #[serde(default)]
     pub findings: Vec<FindingRecord>,
+    /// True where the corrected URDF belongs to a controller into which mastering.csv was entered: joint offsets are not in it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub offsets_in_mastering: bool,
     /// Starting values.
     pub starts: Vec<StartVerdict>,
     /// Robot.

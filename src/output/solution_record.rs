@@ -1,6 +1,5 @@
 //! From a solution to the record in solution.json.
 
-use super::Context;
 use super::bodies_record::BodiesRecord;
 use super::estimates::lower_triangle;
 use super::gauge::Gauge;
@@ -10,6 +9,7 @@ use super::solution_json::{
     AccuracyRecord, FORMAT, JointRecord, PlacedRecord, ProgramRecord, RobotRecord, ScatterRecord, SolutionRecord,
     TermRecord, UrdfRecord,
 };
+use super::{Context, Offsets};
 use crate::error::Result;
 use crate::identify::Solution;
 use crate::model::joint_terms::{JointTerm, Term};
@@ -54,6 +54,7 @@ pub(super) fn record(
         statistics: seen.statistics(),
         notices: solution.notices(),
         findings: solution.findings.iter().map(Into::into).collect(),
+        offsets_in_mastering: context.offsets == Offsets::Mastering,
         starts: solution.starts.clone(),
         robot: robot(&solution.fit.state, solution.fit.problem.twist_factor()),
         cameras: seen.cameras(),

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::outputs_support::{context, robot, series_in_postures, solved};
+use crate::outputs_support::{context, robot, series, series_in_postures, solved};
 use nalgebra::{Matrix4, Vector3, Vector6};
 use robotcal::Code;
 use robotcal::geom::{Pose, exp_so3};
-use robotcal::identify::{Options, RobotModel, identify};
+use robotcal::identify::{Options, RobotModel, Selection, identify};
 use robotcal::model::robot::Robot;
 use robotcal::output::flange_table::flange_at;
 use robotcal::output::restore::found_model;
@@ -81,6 +81,19 @@ fn the_urdf_for_those_who_read_nothing_else_is_a_file_of_its_own() {
     assert_eq!((with(of(name), None), with(of("kuka_kr6_r900.calibrated.urdf"), terms)), (Ok(()), Ok(())));
     let e = solution.uncertainty.flange.unwrap();
     assert!(e.alone_m.unwrap() <= e.urdf_m && e.model_m <= e.alone_m.unwrap(), "{e:?}");
+}
+
+/// A joint that was not estimated has no offset that is known to be none.
+#[test]
+fn an_offset_that_was_held_is_not_determined() {
+    let description = robot();
+    let chain = description.chain(None, None).unwrap();
+    let selection = Selection { fix: vec!["robot/joint_a1*".into()], ..Selection::default() };
+    let options = Options { selection, model: RobotModel::Rigid, ..Options::default() };
+    let solution = identify(chain, &[series(CameraMount::Hand, &description)], &options).unwrap();
+    let table = rows(&text(&files(&solution, &context(&description)).unwrap(), "mastering.csv"));
+    let row = table.iter().find(|row| row["joint"] == "joint_a1").unwrap();
+    assert_eq!((row["sigma"].as_str(), row["determined"].as_str()), ("", "no"), "{row:?}");
 }
 
 #[test]

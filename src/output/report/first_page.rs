@@ -125,7 +125,11 @@ fn steps(r: &SolutionRecord, v: &Verdict) -> Vec<Markup> {
     if let Some(urdf) = alone.or(r.file_ending_with(CALIBRATED)) {
         all.push(html! {
             "Use " code { (urdf) } @if alone.is_some() { " where nothing else than a URDF is read" }
-            ": joint offsets are in it, controller angles stay as they are."
+            @if r.offsets_in_mastering {
+                ", and enter " code { "mastering.csv" } " in the controller first: joint offsets are not in the URDF."
+            } @else {
+                ": joint offsets are in it, controller angles stay as they are."
+            }
         });
     }
     if r.beyond_urdf() {
