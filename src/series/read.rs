@@ -138,7 +138,12 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     let mut notices = Vec::new();
     let (mut stops, mut controller, mut spatial) = (Stops::default(), None, SpatialFiles::default());
     let source = if let Some(recording) = &manifest.mcap {
-        Source::Recording(folder.join(recording))
+        let recording = folder.join(recording);
+        // What is not there is said by what needs it.
+        if recording.exists() {
+            require_recording(&recording)?;
+        }
+        Source::Recording(recording)
     } else {
         (stops, controller) = stops_of(folder, &manifest, &manifest_path, &mut inputs)?;
         spatial = SpatialFiles::read(folder, &stops, &mut inputs)?;
