@@ -94,7 +94,10 @@ pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &Bo
     regions(&plate)?;
     let sheet = size.sheet.unwrap_or_else(|| Sheet::fitting(&plate));
     let [width, height] = quiet_field_m(&plate).map(|half| 2.0 * half);
-    if sheet.width_m < width || sheet.height_m < height {
+    let holds = |sheet: &Sheet| sheet.width_m >= width && sheet.height_m >= height;
+    let upright = sheet.paper.and_then(|name| Sheet::by_name(name, true));
+    let sheet = upright.filter(|upright| !holds(&sheet) && holds(upright)).unwrap_or(sheet);
+    if !holds(&sheet) {
         let (width, height) = (width * 1e3, height * 1e3);
         let what = format!("the board needs {width:.0} x {height:.0} mm");
         return Err(Error::new(Code::PlateImpossible, "--sheet", what, "take a larger sheet or a smaller board"));

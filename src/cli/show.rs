@@ -72,7 +72,8 @@ pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {
         say!("{}", String::from_utf8_lossy(&solution_json::to_bytes(&first)?));
         return Ok(verdict_of(&first));
     }
-    let folder = args.solutions[0].parent().unwrap_or(Path::new(""));
+    let given = args.solutions[0].as_path();
+    let folder = if given.is_dir() { given } else { given.parent().unwrap_or(Path::new("")) };
     match args.all || stages::are_told() {
         true => say!("{}", long_table::text(&first)),
         false => say!("{}", summary::text(&first, folder)),
