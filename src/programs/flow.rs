@@ -333,10 +333,20 @@ impl<T: Followed> Flow<T> {
 
     /// A routine is called.
     pub fn call(&mut self, name: String, now: &mut T) {
-        let behind = self.known.ends.get(&name).map(|end| now.behind_call(end));
+        let behind = self.behind(&name, now);
         let before = std::mem::replace(now, behind.unwrap_or_else(|| now.clone()));
+        self.begins_beside(name, before);
+    }
+
+    /// A routine is begun beside the text, with `top` at its top.
+    pub fn begins_beside(&mut self, name: String, top: T) {
         let calls = self.found.calls.entry(name);
-        calls.and_modify(|all| *all = all.merged(&before, CALLS)).or_insert(before);
+        calls.and_modify(|all| *all = all.merged(&top, CALLS)).or_insert(top);
+    }
+
+    /// What a caller of a routine would have behind it; `None` where its end is not known.
+    pub fn behind(&self, name: &str, now: &T) -> Option<T> {
+        self.known.ends.get(name).map(|end| now.behind_call(end))
     }
 }
 

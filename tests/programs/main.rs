@@ -11,6 +11,7 @@ mod changing;
 mod frames;
 mod frames_study;
 mod given;
+mod interrupts;
 mod krl;
 mod loops;
 mod not_told;

@@ -42,7 +42,7 @@ fn krl_pose(cell: &Cell, q: &[f64]) -> String {
     format!("{{{}}}", pose_text(cell, q))
 }
 
-fn krl(cell: &Cell, body: &str) -> String {
+pub(super) fn krl(cell: &Cell, body: &str) -> String {
     let writer = Writer { joints: &krl_joints, pose: &|q| krl_pose(cell, q) };
     let head = format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {}\n", krl_joints(&START));
     head + &writer.text(body) + "END\n"

@@ -14,6 +14,15 @@ const WORDS: [&str; 18] = [
     "NOT", "WHEN", "DO", "B_NOT",
 ];
 
+/// Statements that run something beside the text, when an event comes.
+const BESIDE: [&str; 2] = ["INTERRUPT", "TRIGGER"];
+
+/// True where the line on whose beginning the reader stands runs something beside the text.
+pub(super) fn is_beside(reader: &Reader<'_>) -> bool {
+    let first = isize::from(reader.ahead_is_word(0, "GLOBAL"));
+    BESIDE.iter().any(|word| reader.ahead_is_word(first, word))
+}
+
 /// Name of the routine that a line begins: `[GLOBAL] DEF NAME(..)`, `[GLOBAL] DEFFCT TYPE NAME(..)`.
 pub(super) fn routine_name(reader: &Reader<'_>) -> Option<String> {
     let word = |k| Some(String::from_utf8_lossy(reader.text(reader.ahead(k)?)).to_ascii_uppercase());

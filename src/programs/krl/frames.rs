@@ -1,5 +1,7 @@
 //! Tool and base of a motion: `$TOOL`, `$BASE` and `$IPO_MODE`.
 
+use std::collections::BTreeSet;
+
 use crate::geom::Pose;
 use crate::programs::flow::{Followed, Held};
 
@@ -34,13 +36,20 @@ pub(super) struct Active {
     pub tool: Held<FrameIs>,
     pub base: Held<FrameIs>,
     pub tool_in_room: Held<bool>,
+    /// Routines and frames that an interrupt or a trigger may run or set at any time.
+    pub beside: Held<BTreeSet<String>>,
 }
 
 impl Active {
     /// Nothing yet.
     pub fn unset() -> Self {
         let Frames { tool, base, tool_in_room } = Frames::default();
-        Self { tool: Held::new(tool), base: Held::new(base), tool_in_room: Held::new(tool_in_room) }
+        Self {
+            tool: Held::new(tool),
+            base: Held::new(base),
+            tool_in_room: Held::new(tool_in_room),
+            beside: Held::new(BTreeSet::new()),
+        }
     }
 
     /// All of it.
@@ -58,11 +67,17 @@ impl Followed for Active {
             tool: self.tool.merged(&other.tool, unknown),
             base: self.base.merged(&other.base, unknown),
             tool_in_room: self.tool_in_room.merged(&other.tool_in_room, |_, _| true),
+            beside: self.beside.merged(&other.beside, |one, other| one | other),
         }
     }
 
     fn at_top(&self) -> Self {
-        Self { tool: self.tool.at_top(), base: self.base.at_top(), tool_in_room: self.tool_in_room.at_top() }
+        Self {
+            tool: self.tool.at_top(),
+            base: self.base.at_top(),
+            tool_in_room: self.tool_in_room.at_top(),
+            beside: self.beside.at_top(),
+        }
     }
 
     fn behind_call(&self, end: &Self) -> Self {
@@ -70,6 +85,7 @@ impl Followed for Active {
             tool: self.tool.behind_call(&end.tool),
             base: self.base.behind_call(&end.base),
             tool_in_room: self.tool_in_room.behind_call(&end.tool_in_room),
+            beside: self.beside.behind_call(&end.beside),
         }
     }
 }
@@ -83,7 +99,8 @@ pub(super) struct OwnFrames {
 }
 
 impl OwnFrames {
-    pub fn or(self, other: &Self) -> Self {
+    pub fn or(self, other: Option<&Self>) -> Self {
+        let Some(other) = other else { return self };
         Self {
             tool: self.tool.or_else(|| other.tool.clone()),
             base: self.base.or_else(|| other.base.clone()),

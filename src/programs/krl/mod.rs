@@ -2,6 +2,7 @@
 
 mod aggregate;
 mod assigned;
+mod beside;
 mod calls;
 mod frames;
 mod motions;
@@ -16,7 +17,7 @@ use std::path::Path;
 
 use aggregate::{Aggregate, index};
 use assigned::{Assigned, assigned, matching};
-use calls::routine_name;
+use calls::{is_beside, routine_name};
 use frames::{Active, FrameIs, Frames, OwnFrames};
 use motions::{MOVES, RELATIVE, posture_of};
 use scopes::Scopes;
@@ -90,7 +91,7 @@ fn reading(
         now: unset(),
         flow: Flow::new(known),
         motion_data: None,
-        spline: OwnFrames::default(),
+        spline: None,
         way: Itinerary::new(),
     };
     let mut references = References::default();
@@ -138,14 +139,14 @@ struct Module<'a> {
     /// Motion data (`FDAT_ACT`) that `BAS` has not taken yet.
     motion_data: Option<Frames>,
     /// Frames of the spline block that is open.
-    spline: OwnFrames,
+    spline: Option<OwnFrames>,
     way: Itinerary,
 }
 
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
         self.start_afresh();
-        (self.now, self.motion_data, self.spline) = (unset(), None, OwnFrames::default());
+        (self.now, self.motion_data, self.spline) = (unset(), None, None);
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -158,7 +159,7 @@ impl Module<'_> {
             let spline = word == "SPLINE" || (word == "PTP" && reader.ahead_is_word(1, "SPLINE"));
             if moves && spline {
                 // Frames of a spline block hold for all of it.
-                self.spline = self.with(&mut reader);
+                self.spline = Some(self.with(&mut reader));
             } else if moves && reader.ahead_is_mark(1, b':') {
                 self.label();
             } else if moves && let Some((_, count)) = MOVES.iter().find(|(name, _)| *name == word) {
@@ -166,10 +167,14 @@ impl Module<'_> {
             } else if moves && RELATIVE.contains(&word.as_str()) {
                 let why = Why::new(LeftReason::Relative, "it is relative to the position before");
                 self.leave_at(reader.index, reader.line(), &word, why);
+                self.time_passes();
+            } else if moves && is_beside(&reader) {
+                self.sets_beside(&mut reader);
             } else if moves && self.flow(&reader, &word) {
             } else if moves && word == "BAS" {
                 self.bas(&mut reader);
             } else {
+                self.waits(&word);
                 self.assignment(&mut reader, system || moves)?;
             }
             reader.skip_line();
@@ -269,7 +274,7 @@ impl Module<'_> {
         let at = reader.at;
         let own = self.with(reader);
         reader.at = at;
-        let frames = own.or(&self.spline).over(&self.now.0);
+        let frames = own.or(self.spline.as_ref()).over(&self.now.0);
         for k in 0..count {
             if k > 0 && !reader.take_mark(b',') {
                 let what = format!("{name} has {k} targets, not {count}");
@@ -314,6 +319,7 @@ impl Module<'_> {
             // The circle goes on, or ends before the point.
             self.way.go_beyond(&mut self.now.1);
         }
+        self.time_passes();
         Ok(())
     }
 
@@ -348,7 +354,10 @@ impl Module<'_> {
                 self.way.branches_end();
                 self.flow.end(&mut self.now);
             }
-            "ENDSPLINE" => self.spline = OwnFrames::default(),
+            "ENDSPLINE" => {
+                self.spline = None;
+                self.time_passes();
+            }
             _ => return false,
         }
         true
@@ -372,7 +381,9 @@ impl Module<'_> {
         for (k, token) in line.filter(|(_, token)| token.kind == TokenKind::Word) {
             let name = String::from_utf8_lossy(reader.text(token)).to_ascii_uppercase();
             let is_given = [b'(', b','].iter().any(|mark| reader.ahead_is_mark(k - 1, *mark));
-            if reader.ahead_is_mark(k + 1, b'(') {
+            if reader.ahead_is_mark(k + 1, b'(') && is_beside(reader) {
+                self.begins_beside(name);
+            } else if reader.ahead_is_mark(k + 1, b'(') {
                 self.way.call(name, &mut self.flow, &mut self.now);
             } else if is_given && self.assigned.changes(&name) {
                 let unknown = FrameIs::Unknown("a routine that it is given to may change it".into());
