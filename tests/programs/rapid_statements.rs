@@ -142,3 +142,94 @@ fn a_move_that_names_no_work_object_is_in_that_of_the_world_whatever_the_flags_s
     let texts = [&[][..], &[flag.as_str()]].map(|flags| run(&cell, &body, flags).1.expect(0).text("m.mod"));
     assert_eq!(texts[0], texts[1]);
 }
+
+#[test]
+fn instructions_of_the_controller_that_move_are_corrected_in_any_case() {
+    let cell = Cell::kuka(96);
+    let end = "v1,z1,tGun\\WObj:=wTable;";
+    for (names, arguments, targets) in [
+        (&["MoveJ", "movel", "MOVEJDO", "MoveLSync", "MoveLAO", "MoveJGO", "TriggJ", "TriggLIOs"][..], "@", 1),
+        (&["ArcL", "ArcLStart", "arcl1", "ArcL2End", "ArcMoveL", "SpotL", "SpotJ", "SpotML"], "@", 1),
+        (&["MoveC", "movecdo", "MoveCSync", "TriggC", "ArcC", "ArcCEnd", "ArcC1Start", "ArcMoveC"], "@,\n@", 2),
+        (&["SearchL", "searchl \\Stop,"], "di1,pFound,@", 1),
+        (&["SearchC"], "di1,pFound,@,\n@", 2),
+    ] {
+        for name in names {
+            let (text, run) = run(&cell, &format!("{name} {arguments},{end}"), &[]);
+            let run = run.expect(0);
+            assert_eq!(run.told().corrected, targets, "{name}");
+            let points: Vec<usize> = (11..11 + targets).collect();
+            assert_all_meet(&cell, &text, &run.text("m.mod"), &points);
+        }
+    }
+}
+
+#[test]
+fn routines_whose_names_begin_as_those_of_instructions_are_calls() {
+    let cell = Cell::kuka(97);
+    let step = "MoveJ @,v1,z1,tGun\\WObj:=wTable;";
+    let home = "MoveAbsJ #,v1,z1,tGun;";
+    for (body, targets) in [
+        (format!("MoveHome\\Fast;\n{step}\nENDPROC\nPROC MoveHome(\\switch Fast)\n{home}"), 2),
+        (format!("movehome\\Fast;\n{step}\nENDPROC\nLOCAL PROC MoveHome(\\switch Fast)\n{home}"), 2),
+        (format!("IF di1=1 MoveHome\\Fast;\n{step}\nENDPROC\nPROC MoveHome(\\switch Fast)\n{home}"), 2),
+        (format!("MoveHome\\Fast;\n{step}"), 1),
+        (format!("SpotGunOff\\G1;\n{step}"), 1),
+        (format!("ArcKill\\Now;\nArcRefresh\\UpdateWeld;\n{step}"), 1),
+        (format!("TriggCheckIO check,100,di1,EQ,1,iCheck;\n{step}"), 1),
+        (format!("MoveToStation 3;\nMoveGripper 20,TRUE;\n{step}\nENDPROC\nPROC MoveToStation(num n)\n{home}"), 2),
+        (format!("ArcL 3;\n{step}\nENDPROC\nPROC ArcL(num n)\n{home}"), 2),
+    ] {
+        let (text, run) = run(&cell, &body, &[]);
+        let run = run.expect(0);
+        assert_eq!(run.told().corrected, targets, "{body}");
+        assert_all_meet(&cell, &text, &run.text("m.mod"), &[11]);
+    }
+}
+
+#[test]
+fn a_displacement_that_such_a_routine_begins_holds_behind_its_call() {
+    let cell = Cell::kuka(98);
+    let step = "MoveJ @,v1,z1,tGun\\WObj:=wTable;";
+    let shift = "PDispSet [[100,0,0],[1,0,0,0],[0,0,0],[0,0,0]];";
+    let frame = vec![LeftReason::FrameUnknown.name().to_owned()];
+    for (call, name) in [("MoveFrame\\On;", "MoveFrame"), ("SearchFrame 3;", "SearchFrame"), ("ArcL;", "ArcL")] {
+        let body = format!("{call}\n{step}\nENDPROC\nPROC {name}()\n{shift}");
+        let told = run(&cell, &body, &[]).1.told();
+        let left: Vec<String> = told.left.into_iter().map(|(.., reason)| reason).collect();
+        assert_eq!((told.corrected, &left), (0, &frame), "{body}");
+    }
+}
+
+#[test]
+fn points_of_an_unknown_routine_are_not_taken_for_those_of_the_world() {
+    let cell = Cell::kuka(99);
+    let told_work = "--work=279.75,-60,23.5,0.707106781,0,0,0.707106781";
+    let (computed, unvisited) = (LeftReason::Computed.name(), LeftReason::Unvisited.name());
+    let own = |name: &str, call: &str| {
+        format!(
+            "{call}\nENDPROC\nPROC {name}(robtarget p,speeddata v,zonedata z,PERS tooldata t)\nMoveJ p,v,z,t\\WObj:=wTable;"
+        )
+    };
+    for (body, flags, corrected, left) in [
+        ("MovePick p1,v1,z1,tGun;".to_owned(), vec![], 0, vec![unvisited]),
+        ("ArcPick p1,v1,z1,tGun;".to_owned(), vec![], 0, vec![unvisited]),
+        ("SearchEdge p1,v1,z1,tGun;".to_owned(), vec![], 0, vec![unvisited]),
+        ("MovePick p1,v1,z1,tGun;".to_owned(), vec![told_work], 1, vec![]),
+        ("MovePick p1,v1,z1,tGun\\WObj:=wTable;".to_owned(), vec![], 1, vec![]),
+        (own("MovePick", "MovePick p1,v1,z1,tGun;"), vec![], 0, vec![computed, unvisited]),
+        (own("SpotL", "SpotL p1,v1,z1,tGun;"), vec![], 0, vec![computed, unvisited]),
+        ("MovePick @,v1,z1,tGun;".to_owned(), vec![], 0, vec![LeftReason::NotATarget.name()]),
+    ] {
+        let (text, run) = run(&cell, &body, &flags);
+        let told = run.told();
+        let mut found: Vec<&str> = told.left.iter().map(|(.., reason)| reason.as_str()).collect();
+        found.sort_unstable();
+        assert_eq!((told.corrected, found), (corrected, left), "{body} {flags:?}");
+        if corrected == 1 {
+            assert_all_meet(&cell, &text, &run.text("m.mod"), &[1]);
+        } else {
+            assert_eq!(text, run.text("m.mod"), "{body}");
+        }
+    }
+}

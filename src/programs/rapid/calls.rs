@@ -3,19 +3,17 @@
 use std::ops::Range;
 
 use super::Task;
+use super::moves::{targets_of, writes_found};
 use super::statements::{CONTROL, DECLARE, OPERATORS, behind_header, is_control, statement_end};
 use super::switching::{ROUTINES, routine_name, words_before_name};
 use super::value::{TYPES, element};
 use crate::programs::references::{Call, Calling, Given, Parameter, Passing, References, Which, parts, variable};
 use crate::programs::scan::{Reader, TokenKind};
 
-/// Beginnings of the names of instructions of the controller that move, and write none of the positions, tools and work objects that they name.
-const MOVE: [&str; 4] = ["MOVE", "TRIGG", "ARC", "SPOT"];
-/// Instructions that write the point which they find: their second argument.
-const SEARCH: &str = "SEARCH";
 /// Instructions and functions of the controller that can name a position, a tool or a work object, and only read them (ABB, *Technical reference
 /// manual RAPID Instructions, Functions and Data types*).
-const READ: [&str; 52] = [
+const READ: [&str; 54] = [
+    "ARCMOVEEXTJ",
     "ARGNAME",
     "CALCJOINTT",
     "CALCROBT",
@@ -44,6 +42,7 @@ const READ: [&str; 52] = [
     "ISVAR",
     "LOADID",
     "MIRPOS",
+    "MOVEEXTJ",
     "OFFS",
     "ORIENTZYX",
     "OROBT",
@@ -74,7 +73,7 @@ const LATE: &str = "%";
 
 /// True for what the controller itself offers, as far as it reads its arguments only.
 fn reads(routine: &str) -> bool {
-    MOVE.iter().any(|name| routine.starts_with(name)) || READ.contains(&routine)
+    targets_of(routine).is_some() || READ.contains(&routine)
 }
 
 /// The name that an argument is, alone or with an index or components.
@@ -214,7 +213,7 @@ impl Task<'_> {
 
     /// Variables that calls may change are computed; constants cannot be given by reference.
     pub(super) fn changed_by_calls(&mut self, references: &References) {
-        let changed = references.changed(|call, given| match call.routine.starts_with(SEARCH) {
+        let changed = references.changed(|call, given| match writes_found(&call.routine) {
             true => given.which == Which::Nth(1),
             false => !reads(&call.routine) && !self.goes(call),
         });

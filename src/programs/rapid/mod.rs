@@ -2,6 +2,7 @@
 
 mod array;
 mod calls;
+mod moves;
 mod scopes;
 mod statements;
 mod switched;
@@ -10,7 +11,7 @@ mod unvisited;
 mod uses;
 mod value;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::ProgramSetting;
@@ -30,6 +31,7 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
+use moves::{is_of_joints, is_to_joints};
 use scopes::Scopes;
 use switched::Watched;
 use switching::{Now, Switching};
@@ -84,6 +86,7 @@ fn reading(
         data: BTreeMap::new(),
         bases: BTreeMap::new(),
         uses: BTreeMap::new(),
+        routines: BTreeSet::new(),
         switching: Switching::new(known),
         way: Itinerary::new(),
     };
@@ -94,6 +97,7 @@ fn reading(
         task.switching.look_through(reader(file)?);
     }
     task.changed_by_calls(&references);
+    task.routines = references.routines().map(str::to_owned).collect();
     for file in files.iter().enumerate() {
         task.way.start_afresh();
         task.statements(reader(file)?)?;
@@ -111,6 +115,8 @@ struct Task<'a> {
     bases: BTreeMap<String, Target>,
     /// What statements that are no known moves do with points.
     uses: BTreeMap<String, Vec<Use>>,
+    /// Routines in the files: whatever their names, they are no instructions of the controller.
+    routines: BTreeSet<String>,
     /// What instructions switch for those behind them.
     switching: Switching,
     way: Itinerary,
@@ -189,9 +195,7 @@ impl Task<'_> {
 
     fn leave(&mut self, (file, line): (usize, usize), name: &str, why: Why) {
         // Confdata may mean another posture, but on a path of the tool it goes on.
-        let upper = name.to_ascii_uppercase();
-        let same_posture =
-            !upper.starts_with("MOVEJ") && !upper.starts_with("MOVEABSJ") && !upper.starts_with("TRIGGJ");
+        let same_posture = !is_of_joints(&name.to_ascii_uppercase());
         self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture, self.switching.stands());
     }
 
@@ -209,7 +213,7 @@ impl Task<'_> {
         let (value, place, named) = match value {
             Node::List(_) => {
                 let place = format!("{}:{}", "the instruction in line", from.1);
-                let kind = if name.to_ascii_uppercase().starts_with("MOVEABSJ") { "JOINTTARGET" } else { "ROBTARGET" };
+                let kind = if is_to_joints(&name.to_ascii_uppercase()) { "JOINTTARGET" } else { "ROBTARGET" };
                 check(kind, name, value, &place)?;
                 (value.clone(), from, name.to_owned())
             }
@@ -252,9 +256,8 @@ impl Task<'_> {
     fn with_posture(&self, kind: TargetKind, name: &str) -> TargetKind {
         let TargetKind::Pose(mut pose) = kind else { return kind };
         let upper = name.to_ascii_uppercase();
-        let of_joints = upper.starts_with("MOVEJ") || upper.starts_with("TRIGGJ") || upper.ends_with('J');
         let near = if upper.starts_with("MOVEL") { MeantPosture::Along } else { MeantPosture::Nearest };
-        pose.posture = match (self.switching.now().watched[usize::from(!of_joints)].value, pose.posture) {
+        pose.posture = match (self.switching.now().watched[usize::from(!is_of_joints(&upper))].value, pose.posture) {
             (Watched::Off, _) => near,
             (Watched::Unknown, MeantPosture::Coded(codes, axes)) => MeantPosture::Either(codes, axes),
             (_, posture) => posture,

@@ -1,20 +1,15 @@
 //! Statements of RAPID: where each begins and ends, and which of them move.
 
 use super::Task;
+use super::moves::{Targets, targets_of};
 use super::switching::{ROUTINES, words_before_name};
 use super::value::{Node, TYPES, node};
 use crate::error::{Code, Error, Result};
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::{Reader, TokenKind};
 
-/// Beginnings of the names of instructions that move the robot to their first arguments.
-const MOVES: [&str; 7] = ["MOVE", "TRIGGL", "TRIGGJ", "TRIGGC", "ARC", "SPOT", SEARCH];
-/// Behind a signal and the point that is found.
-const SEARCH: &str = "SEARCH";
 /// Beginnings of lines in which a position in numbers is not where the robot goes.
 pub(super) const DECLARE: [&str; 8] = ["CONST", "PERS", "VAR", "LOCAL", "TASK", "PROC", "FUNC", "TRAP"];
-/// Instructions that begin so, but move no robot.
-const NO_MOVES: [&str; 2] = ["MOVEEXTJ", "ARCREFRESH"];
 /// Words of the language that begin a statement, or part of one, which ends without a semicolon.
 pub(super) const CONTROL: [&str; 26] = [
     "MODULE",
@@ -131,14 +126,13 @@ fn has_literal(reader: &mut Reader<'_>, end: usize) -> Result<bool> {
     Ok(found)
 }
 
-/// True for a known instruction that moves the robot; the reader stands on its name.
-fn is_move(reader: &Reader<'_>, word: &str) -> bool {
-    let moves = MOVES.iter().any(|m| word.starts_with(m)) && !NO_MOVES.contains(&word);
+/// True where arguments stand behind the word on which the reader stands.
+fn has_arguments(reader: &Reader<'_>) -> bool {
     let mut behind = (1..).filter_map(|k| match reader.ahead(k) {
         Some(token) if token.kind == TokenKind::LineEnd => None,
         token => Some(token.map(|t| t.kind)),
     });
-    moves && !matches!(behind.next().flatten(), None | Some(TokenKind::Mark(b':' | b'(' | b';')))
+    !matches!(behind.next().flatten(), None | Some(TokenKind::Mark(b':' | b'(' | b';')))
 }
 
 /// Arguments of an instruction.
@@ -218,8 +212,8 @@ impl Task<'_> {
             if reader.at < begins {
                 self.switching.within(&word, &mut self.way);
                 reader.at += 1;
-            } else if is_move(&reader, &word) {
-                self.instruction(&mut reader)?;
+            } else if let Some(targets) = self.move_to(&reader, &word) {
+                self.instruction(&mut reader, targets)?;
                 reader.at += 1;
             } else if CONTROL.contains(&word.as_str()) {
                 begins = behind_header(&mut reader, &word);
@@ -257,16 +251,19 @@ impl Task<'_> {
         used
     }
 
+    /// Targets of a known instruction that moves the robot; the reader stands on its name.
+    fn move_to(&self, reader: &Reader<'_>, word: &str) -> Option<Targets> {
+        targets_of(word).filter(|_| !self.routines.contains(word) && has_arguments(reader))
+    }
+
     /// A move; the reader stands on its name and ends on its semicolon.
-    fn instruction(&mut self, reader: &mut Reader<'_>) -> Result<()> {
+    fn instruction(&mut self, reader: &mut Reader<'_>, targets: Targets) -> Result<()> {
         let line = reader.line();
         let name = String::from_utf8_lossy(reader.word().unwrap_or_default()).into_owned();
         reader.at += 1;
         let Arguments { mut plain, work } = arguments(reader, (&name, line))?;
-        if name.to_ascii_uppercase().starts_with(SEARCH) {
-            plain.drain(..plain.len().min(2));
-        }
-        let count = self.targets_of(&name, &plain);
+        plain.drain(..plain.len().min(targets.skipped));
+        let count = targets.count.min(plain.len());
         let tool = self.tool_of(&plain, count);
         for Argument { value, is_whole } in &plain[..count] {
             let done = match is_whole {
@@ -278,13 +275,6 @@ impl Task<'_> {
             }
         }
         Ok(())
-    }
-
-    /// Number of arguments that are targets: two for circles.
-    fn targets_of(&self, name: &str, arguments: &[Argument]) -> usize {
-        let name = name.to_ascii_uppercase();
-        let circle = ["MOVEC", "TRIGGC", "ARCC", "SPOTC", "SEARCHC"].iter().any(|c| name.starts_with(c));
-        (1 + usize::from(circle)).min(arguments.len())
     }
 
     /// True for the name of a tool.
