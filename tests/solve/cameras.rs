@@ -6,7 +6,7 @@ use robotcal::identify::{JointNoise, Options, Selection, Solution, identify};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::Robot;
 use robotcal::output::{self, restore, solution_json};
-use robotcal::problem::{LensChoice, MeasuredSeries, MeasuredStop};
+use robotcal::problem::{LensChoice, MeasuredSeries, MeasuredStop, PlateShape};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 
 use crate::outputs_support::{context, robot, scene};
@@ -70,19 +70,24 @@ fn seen(mounts: &[CameraMount], wanted: usize, seed: u64) -> Seen {
 fn seen_displaced(mounts: &[CameraMount], wanted: usize, seed: u64, sizes: [f64; 4]) -> Seen {
     let nominal = Robot::nominal(robot().chain(None, None).unwrap());
     let middle = scene(mounts[0], &nominal).middle;
-    seen_at(mounts, wanted, &mut Dice::new(seed), sizes, |_, dice| Some(Taken::near(&middle, dice)))
+    let plates = vec![PlateShape::nominal(&plate()); mounts.len()];
+    seen_at((mounts, &plates), wanted, &mut Dice::new(seed), sizes, |_, dice| Some(Taken::near(&middle, dice)))
 }
 
-/// The same, where the stops are taken as `at` says of each; without cameras, what was taken alone.
+pub fn plate() -> Plate {
+    Plate::lattice(PlateKind::Points, 8, 6, 0.03, 1e-6)
+}
+
+/// The same, where the plates are as printed and the stops are taken as `at` says of each; without cameras, what was taken alone.
 pub fn seen_at(
-    mounts: &[CameraMount],
+    (mounts, printed): (&[CameraMount], &[PlateShape]),
     wanted: usize,
     dice: &mut Dice,
     sizes: [f64; 4],
     mut at: impl FnMut(usize, &mut Dice) -> Option<Taken>,
 ) -> Seen {
     let nominal = Robot::nominal(robot().chain(None, None).unwrap());
-    let plate = Plate::lattice(PlateKind::Points, 8, 6, 0.03, 1e-6);
+    let plate = plate();
     let mut camera = Camera::pinhole(Lens::Brown, 1280, 1024, 1100.0);
     camera.parameters = vec![1103.0, 1101.0, 645.0, 508.0, -0.15, 0.03, 8e-4, -5e-4, 0.0];
     let cameras: Vec<(Pose, Pose)> = (0..mounts.len()).map(|k| placed(mounts, &nominal, k)).collect();
@@ -98,9 +103,11 @@ pub fn seen_at(
         let shows = |p: &Pose| faces(p) && (0.12..0.9).contains(&p.translation.norm());
         let views: Vec<Vec<Observation>> = poses
             .iter()
-            .map(|pose| {
-                let see = |m: &robotcal::series::Marker| {
-                    let uv = camera.project(&pose.transform(&m.position_m)).filter(|uv| camera.contains(uv, 8.0))?;
+            .zip(printed)
+            .map(|(pose, printed)| {
+                let see = |(k, m): (usize, &robotcal::series::Marker)| {
+                    let uv =
+                        camera.project(&pose.transform(&printed.position(k))).filter(|uv| camera.contains(uv, 8.0))?;
                     let uv = [uv.x + dice.normal(PIXEL_SIGMA), uv.y + dice.normal(PIXEL_SIGMA)];
                     let variance = PIXEL_SIGMA * PIXEL_SIGMA;
                     Some(Observation {
@@ -110,7 +117,7 @@ pub fn seen_at(
                         covariance: Some([variance, 0.0, variance]),
                     })
                 };
-                if shows(pose) { plate.markers.iter().filter_map(see).collect() } else { Vec::new() }
+                if shows(pose) { plate.markers.iter().enumerate().filter_map(see).collect() } else { Vec::new() }
             })
             .collect();
         if !views.is_empty() && views.iter().all(|v| v.len() < 20) {

@@ -3,12 +3,13 @@
 use nalgebra::{Vector3, Vector6};
 use robotcal::geom::Pose;
 use robotcal::identify::{JointNoise, Solution};
+use robotcal::model::plate_modes::PRIOR_SIGMA;
 use robotcal::model::robot::Robot;
-use robotcal::problem::{BodySeen, InstrumentKind, MeasuredSeries, SeenBody};
+use robotcal::problem::{BodySeen, InstrumentKind, MeasuredSeries, PlateShape, SeenBody};
 use robotcal::series::CameraMount;
 use robotcal::solve::Spread;
 
-use crate::cameras::{JOINT_SIGMA, Seen, Taken, normalised, seen_at, solved, solved_with};
+use crate::cameras::{JOINT_SIGMA, Seen, Taken, normalised, plate, seen_at, solved, solved_with};
 use crate::measured_worlds::{stop, with_ball_at};
 use crate::outputs_support::{robot, scene};
 use crate::support::small::Dice;
@@ -88,6 +89,11 @@ fn touched(socket: usize, stop: usize) -> SeenBody {
     }
 }
 
+/// A plate as it may be printed.
+fn printed(dice: &mut Dice) -> PlateShape {
+    PlateShape { modes: PRIOR_SIGMA.map(|sigma| dice.normal(sigma)), ..PlateShape::nominal(&plate()) }
+}
+
 /// A world in which two kinds of measurements were taken at the same stops.
 fn seen(kinds: [Kind; 2], seed: u64) -> Seen {
     let mut dice = Dice::new(seed);
@@ -95,8 +101,9 @@ fn seen(kinds: [Kind; 2], seed: u64) -> Seen {
     let mounts: Vec<CameraMount> = kinds.into_iter().filter_map(Kind::mount).collect();
     let middle = scene(mounts.first().copied().unwrap_or(CameraMount::Hand), &nominal).middle;
     let sockets = kinds.contains(&Kind::Contacts).then(|| Sockets::new(&nominal, &middle, &mut dice));
+    let plates: Vec<PlateShape> = mounts.iter().map(|_| printed(&mut dice)).collect();
     let mut taken: Vec<Taken> = Vec::new();
-    let mut seen = seen_at(&mounts, STOPS, &mut dice, [0.0; 4], |stop, dice| {
+    let mut seen = seen_at((&mounts, &plates), STOPS, &mut dice, [0.0; 4], |stop, dice| {
         let drawn = Taken::near(&middle, dice);
         let own = match &sockets {
             None => drawn,
@@ -186,7 +193,8 @@ fn study_of_mixtures() {
         let columns = [0, 1, 2].map(|c| mean(&all.iter().map(|judged| judged[c]).collect::<Vec<_>>()));
         let words = columns.map(|(mean, half)| format!("{mean:.3} (+-{half:.3})")).join(" | ");
         println!("| {kinds:?} | {} | {words} |", all.len());
-        if [0, 2].into_iter().any(|c: usize| (columns[c].0 - 1.0).abs() > columns[c].1) {
+        // All joints are alike, which their sizes are drawn towards: they scatter less than is stated for joints that may differ.
+        if (columns[0].0 - 1.0).abs() > columns[0].1 || columns[2].0 > 1.0 + columns[2].1 {
             outside.push(kinds);
         }
     }
