@@ -9,6 +9,7 @@ use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem, SCALE, State, UNKNOWN_SCALE, seen_markers, size_by_distance};
 use crate::series::Plate;
 use crate::solve::{ComponentOptions, Status, System, estimate_components};
+use crate::urdf::JointKind;
 
 const ASPECT: usize = 1;
 
@@ -28,6 +29,8 @@ pub enum DoubtedSize {
         sigma: f64,
         /// Gate or note.
         weight: Weight,
+        /// True where a rail moves the arm or the plate, whose readings may be as wrong as the plate's size.
+        on_rail: bool,
     },
     /// Rows and columns differ in scale.
     Uneven {
@@ -35,6 +38,8 @@ pub enum DoubtedSize {
         off: f64,
         /// Prior sigma of it.
         tolerance: f64,
+        /// As above.
+        on_rail: bool,
     },
 }
 
@@ -42,6 +47,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     let Adjustment { problem, state } = &fit.adjustment;
     let limits = setting.limits;
     let some = fit.adjustment.some_stops(MOST_STOPS, MOST_STOPS);
+    let on_rail = state.robot.chain.reading_kinds.contains(&JointKind::Prismatic);
     let mut doubts = Vec::new();
     for (k, plate) in problem.plates.iter().enumerate() {
         let released = ReleasedSize::of(some.as_ref().unwrap_or(&fit.adjustment), k);
@@ -57,13 +63,13 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
                 _ => None,
             }
         {
-            doubts.push(DoubtedSize::Contradicted { measured, off: told.off, sigma: told.sigma, weight });
+            doubts.push(DoubtedSize::Contradicted { measured, off: told.off, sigma: told.sigma, weight, on_rail });
         }
         if plate.scale.is_none()
             && let Some((off, tolerance)) = x_y_scale(problem, state, k)
             && off.abs() > limits.plate_aspect_sigmas * tolerance
         {
-            doubts.push(DoubtedSize::Uneven { off, tolerance });
+            doubts.push(DoubtedSize::Uneven { off, tolerance, on_rail });
         }
     }
     doubts
@@ -91,7 +97,7 @@ impl Kind for DoubtedSize {
     fn quantities(&self) -> Vec<Quantity> {
         match *self {
             Self::Contradicted { off, sigma, .. } => vec![Quantity::new("relative_size", off, "1").with_sigma(sigma)],
-            Self::Uneven { off, tolerance } => {
+            Self::Uneven { off, tolerance, .. } => {
                 vec![Quantity::new("relative_x_y_scale", off, "1"), Quantity::new("tolerance", tolerance, "1")]
             }
         }
@@ -118,6 +124,7 @@ impl Kind for DoubtedSize {
     }
 
     fn remedy(&self) -> String {
+        let (Self::Contradicted { on_rail, .. } | Self::Uneven { on_rail, .. }) = *self;
         let remedy = match self {
             Self::Contradicted { measured: true, .. } => {
                 "check that distance, and that the lengths in the URDF are those of this robot"
@@ -127,7 +134,9 @@ impl Kind for DoubtedSize {
             }
             Self::Uneven { .. } => "measure two far markers and give [scale] in plate.toml",
         };
-        remedy.into()
+        let rail =
+            if on_rail { "; or the rail moves by more or less than it reads: try --robot-model gear" } else { "" };
+        format!("{remedy}{rail}")
     }
 }
 

@@ -152,8 +152,13 @@ fn the_verdict_follows_the_gates_and_then_the_doubts() {
 
 #[test]
 fn what_was_seen_and_what_to_do_stay_apart() {
-    let found =
-        Finding::from(DoubtedSize::Contradicted { measured: false, off: 0.02, sigma: 0.001, weight: Weight::Gate });
+    let found = Finding::from(DoubtedSize::Contradicted {
+        measured: false,
+        off: 0.02,
+        sigma: 0.001,
+        weight: Weight::Gate,
+        on_rail: false,
+    });
     assert!(found.fails() && found.remedy().contains("; "), "a remedy of two parts: {found}");
     let mut record = record();
     record.failed_gates = vec![found.to_string()];
@@ -178,7 +183,8 @@ fn what_was_seen_and_what_to_do_stay_apart() {
 
 #[test]
 fn rows_that_were_exchanged_are_put_right_before_a_failed_result_is_tried_again() {
-    let doubted = DoubtedSize::Contradicted { measured: false, off: 0.02, sigma: 0.001, weight: Weight::Gate };
+    let doubted =
+        DoubtedSize::Contradicted { measured: false, off: 0.02, sigma: 0.001, weight: Weight::Gate, on_rail: false };
     let pair = vec!["img_003.png".to_owned(), "img_008.png".to_owned()];
     let exchanged = Finding::from(ExchangedReadings { circle: pair.clone(), images: pair, misfit: 1e-4 });
     let (gate, mut record) = (Finding::from(doubted), record());
