@@ -129,6 +129,12 @@ pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &Bo
 
 /// The plate that the flags describe, by way of the text of its plate.toml.
 fn plate(args: &BoardArgs, size: &BoardSize) -> Result<Plate> {
+    let has_ids = matches!(args.kind, Kind::Aprilgrid | Kind::ArucoGrid | Kind::Tag);
+    if args.id != 0 && !has_ids {
+        let what = format!("is not of --kind {}", kind_name(args.kind));
+        let remedy = "leave it out; an aprilgrid, an aruco-grid and a tag have ids that may begin elsewhere than at 0";
+        return Err(Error::new(Code::OptionConflict, "--id", what, remedy));
+    }
     let mut text =
         format!("format = 1\nkind = \"{}\"\ntolerance_m = {:?}\n", kind_name(args.kind), size.tolerance_mm / 1e3);
     let mut key = |name: &str, value: String| writeln!(text, "{name} = {value}").unwrap_or_default();

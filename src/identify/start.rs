@@ -293,9 +293,11 @@ fn pixels(problem: &Problem, state: &State, image: usize) -> Option<f64> {
 fn check_rotations(of: &str, poses: &[PosePair], least: f64) -> Result<()> {
     let mut m = nalgebra::DMatrix::<f64>::zeros(3, 3);
     let (mut largest, first) = (0.0_f64, &poses[0]);
-    let mut travel = 0.0_f64;
+    let (mut travel, mut seen) = (0.0_f64, 0.0_f64);
     for p in poses {
         let v = log_so3(&(first.chain.rotation.transpose() * p.chain.rotation));
+        let turned = first.camera_from_plate.rotation.transpose() * p.camera_from_plate.rotation;
+        seen = seen.max(log_so3(&turned).norm());
         largest = largest.max(v.norm());
         travel = travel.max((first.chain.translation - p.chain.translation).norm());
         m += nalgebra::DMatrix::from_column_slice(3, 3, (v * v.transpose()).as_slice()) / poses.len() as f64;
@@ -303,6 +305,15 @@ fn check_rotations(of: &str, poses: &[PosePair], least: f64) -> Result<()> {
     let second = symmetric_eigen(&m).map_or(0.0, |(values, _)| values[1].max(0.0).sqrt());
     if second > least {
         return Ok(());
+    }
+    if seen > least && (0.5..2.0).contains(&(seen / largest.to_degrees())) {
+        let what = format!(
+            "the camera turned by {:.0} degrees between the images, the hand by {:.1} degrees as its readings are read: angles are radians, read as degrees",
+            seen.to_degrees(),
+            largest.to_degrees()
+        );
+        let remedy = "write joint_unit = \"rad\" in series.toml; in controller.csv convert the angles, or state the rotation in radians";
+        return Err(Error::new(Code::JointUnitWrong, of, what, remedy));
     }
     Err(Error::new(
         Code::StopsAlike,

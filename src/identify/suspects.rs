@@ -6,6 +6,7 @@ use super::bases;
 use super::mistakes::{mistakes_undone, shifted_rows};
 use crate::assess::Limits;
 use crate::diagnose::MistakeKind;
+use crate::error::Code;
 use crate::init::{PosePair, SeenStop, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
@@ -149,6 +150,14 @@ impl Suspects<'_> {
             .collect();
         let error = solve_hand_eye(&scaled).first()?.median_error;
         let plate = &self.problem.plates[self.problem.images[self.pairs.first()?.0].plate];
+        if self.robot.chain.pose_coordinates().is_some() {
+            let what = format!(
+                "the plate is {scale:.3} times as large as plate.toml says, judged by the positions in controller.csv"
+            );
+            let remedy = "bring the positions to metres (of inches the plate seems 39.37 times as large), or correct pitch_m in plate.toml"
+                .to_owned();
+            return Some((error, MistakeKind::Poses { code: Code::PlatePitchWrong, what, remedy }));
+        }
         Some((error, MistakeKind::PlateSize { scale, pitch_m: plate.pitch_m }))
     }
 }

@@ -169,7 +169,9 @@ fn mistakes_in_poses_are_named() {
         let [x, y, z, w] = p.quaternion_xyzw();
         vec![w, x, y, z]
     };
-    let cases: [(TempDir, Code, &str); 7] = [
+    let inches: Vec<_> =
+        poses.iter().map(|(i, p)| (i.clone(), Pose::new(p.rotation, p.translation / 0.0254))).collect();
+    let cases: [(TempDir, Code, &str); 8] = [
         (series("quaternion", "qx,qy,qz,qw", &poses, first), Code::RotationConvention, "qw"),
         (series("rpy_rad", "roll,pitch,yaw", &poses, rotation_vector), Code::RotationConvention, "rotvec_rad"),
         (series("wpr_deg", "w,p,r", &poses, abc_deg), Code::RotationConvention, "abc_deg"),
@@ -177,12 +179,20 @@ fn mistakes_in_poses_are_named() {
         (series("quaternion", "qx,qy,qz,qw", &inverted, quaternion), Code::PosesInverted, "every pose"),
         (series("quaternion", "qx,qy,qz,qw", &turned_back, quaternion), Code::PosesInverted, "rotations alone"),
         (series("quaternion", "qx,qy,qz,qw", &far, quaternion), Code::MillimetresAsMetres, "1000"),
+        (series("quaternion", "qx,qy,qz,qw", &inches, quaternion), Code::PlatePitchWrong, "inches"),
     ];
     for (folder, code, part) in cases {
         let error = calibrated(&folder).unwrap_err();
         assert_eq!(error.code, code, "{error}");
         // words: the convention stands in the sentence and nowhere else.
         assert!(error.to_string().contains(part), "{part} is not in {error}");
+    }
+    for (rotation, columns, written) in [
+        ("wpr_deg", "w,p,r", roll_pitch_yaw as Written),
+        ("abc_deg", "a,b,c", |p| abc_deg(p).iter().map(|v| v.to_radians()).collect()),
+    ] {
+        let error = calibrated(&series(rotation, columns, &poses, written)).unwrap_err();
+        assert_eq!(error.code, Code::JointUnitWrong, "{error}");
     }
 }
 
