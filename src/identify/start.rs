@@ -193,7 +193,7 @@ fn closed_form(
             "take more images, or give series that share camera mounting and plate placement the same names",
         ));
     }
-    check_rotations(of, poses, limits.hand_eye_rotation_rad)?;
+    check_rotations(of, poses, limits)?;
     let starts = solve_hand_eye(poses);
     let cost = |s: &HandEyeStart| {
         let mut trial = state.clone();
@@ -290,7 +290,7 @@ fn pixels(problem: &Problem, state: &State, image: usize) -> Option<f64> {
 }
 
 /// Hand-camera and plate pose need rotations about at least two axes.
-fn check_rotations(of: &str, poses: &[PosePair], least: f64) -> Result<()> {
+fn check_rotations(of: &str, poses: &[PosePair], limits: &Limits) -> Result<()> {
     let mut m = nalgebra::DMatrix::<f64>::zeros(3, 3);
     let (mut largest, first) = (0.0_f64, &poses[0]);
     let (mut travel, mut seen) = (0.0_f64, 0.0_f64);
@@ -303,12 +303,12 @@ fn check_rotations(of: &str, poses: &[PosePair], least: f64) -> Result<()> {
         m += nalgebra::DMatrix::from_column_slice(3, 3, (v * v.transpose()).as_slice()) / poses.len() as f64;
     }
     let second = symmetric_eigen(&m).map_or(0.0, |(values, _)| values[1].max(0.0).sqrt());
-    if second > least {
+    if second > limits.hand_eye_rotation_rad {
         return Ok(());
     }
-    if seen > least && (0.5..2.0).contains(&(seen / largest.to_degrees())) {
+    if seen > limits.hand_eye_rotation_rad && largest < limits.mistake_explains * seen {
         let what = format!(
-            "the camera turned by {:.0} degrees between the images, the hand by {:.1} degrees as its readings are read: angles are radians, read as degrees",
+            "the camera turned by {:.0} degrees between the images, the hand by {:.1} degrees by its readings: these are radians, read as degrees, or were not read anew at every stop",
             seen.to_degrees(),
             largest.to_degrees()
         );
