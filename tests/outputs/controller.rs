@@ -104,6 +104,10 @@ fn offsets_in_the_controller_or_in_the_origins_are_the_same_robot() {
     let mut mastering = context(&description);
     mastering.offsets = Offsets::Mastering;
     let mastering = files(&solution, &mastering).unwrap();
+    let told = |files: &Files| solution_json::read(&files["solution.json"]).unwrap().offsets_in_mastering;
+    assert_eq!([&folded, &mastering].map(told), [false, true]);
+    let named = |files: &Files| text(files, "report.html").matches("mastering.csv").count();
+    assert!(named(&mastering) > named(&folded), "the report tells to enter the zeros");
     let table = rows(&text(&mastering, "mastering.csv"));
     assert_eq!(table.len(), 6);
     assert!(table.iter().all(|r| r["in_urdf"] == "no" && r["unit"] == "deg"));

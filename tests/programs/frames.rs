@@ -12,9 +12,11 @@ use robotcal::error::Code;
 use robotcal::frames::{Given, KnownRobot, Seen, Touches, fit};
 use robotcal::geom::Pose;
 use robotcal::identify::touch_mistake;
+use robotcal::model::inverse::{reading_limits, solve_from};
 use robotcal::model::robot::Robot;
 use robotcal::output::restore::found_model;
 use robotcal::output::solution_json;
+use robotcal::output::work_findings::from_below;
 use robotcal::simulate::truth::Truth;
 
 use crate::programs_support::touching::{Toucher, ranges, spread, write};
@@ -52,7 +54,6 @@ fn exact<'a>(robot: &'a Robot) -> Toucher<'a> {
 
 /// Touches of one unknown point: postures that bring the tool there, the tip turned every way.
 fn one_point(robot: &Robot, start: &[f64], count: usize, rng: &mut ChaCha8Rng) -> Touches {
-    use robotcal::model::inverse::{reading_limits, solve_from};
     let limits = reading_limits(&robot.chain);
     let tool = Pose::new(Matrix3::identity(), TOOL.into());
     let first = robot.base_from_tip(start) * tool;
@@ -284,6 +285,34 @@ fn places_of_another_frame_than_the_base_are_told() {
     let done = robotcal(&args, &folder.path().join("out")).expect(1);
     let left: Vec<String> = done.told().left.iter().map(|(_, _, reason)| reason.clone()).collect();
     assert_eq!(left, ["frame_unknown"]);
+}
+
+/// By mirrored coordinates a plane looks the other way: nothing but the side of the tool tells.
+#[test]
+fn places_of_a_plane_that_were_touched_from_below_are_told() {
+    let World { robot, .. } = world();
+    let mut rng = rng(6);
+    let tool = Pose::new(Matrix3::identity(), TOOL.into());
+    let work = work();
+    let limits = reading_limits(&robot.exported().chain);
+    let down = Pose::from_xyz_rpy([0.0; 3], [std::f64::consts::PI, 0.0, 0.0]);
+    let place = |at: &[f64]| {
+        let tip = work * Pose::new(Matrix3::identity(), Vector3::new(at[0], at[1], 0.0)) * down * tool.inverse();
+        solve_from(robot.exported(), &limits, &tip, &START).unwrap()
+    };
+    let readings: Vec<Vec<f64>> = spread(&[(-0.1, 0.1); 2], 8, &mut rng).iter().map(|at| place(at)).collect();
+    let touches = exact(robot.exported()).places(&readings, "fixture", &mut rng);
+    for mirrored in [false, true] {
+        let mut touches = touches.clone();
+        for touch in touches.all.iter_mut().filter(|_| mirrored) {
+            let Seen::Point(place) = &mut touch.seen else { panic!("a place") };
+            place.y = -place.y;
+        }
+        let found = fit(&robot, &touches, &Given::default(), &Limits::default()).unwrap();
+        let told = from_below(robot.exported(), &found, &touches, "touches");
+        let code = told.map(|finding| (finding.code, finding.weight));
+        assert_eq!(code, mirrored.then_some((Code::TouchedFromBelow, Weight::Note)));
+    }
 }
 
 /// Each bad input is refused with its file and place.

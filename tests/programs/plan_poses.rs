@@ -423,6 +423,20 @@ fn a_rail_is_an_external_axis_of_the_planned_programs() {
     assert!(!files.contains_key("robotcal_plan.script"));
 }
 
+/// Joints between the plate and the link above both are those of a positioner: an arm of five axes behind one of them has no A6.
+#[test]
+fn a_positioner_is_an_external_axis_of_the_planned_programs() {
+    let mut request = request("ur10e", 4);
+    let chosen = plan(&request).unwrap();
+    request.setting.robot.chain.joints[0].upwards = true;
+    let files = robotcal::output::plan_programs::programs(&request, &chosen);
+    let data = String::from_utf8(files["robotcal_plan.dat"].clone()).unwrap();
+    let line = data.lines().find(|l| l.starts_with("DECL E6AXIS")).unwrap();
+    let axes: Vec<&str> = line.split(['{', '}', ',']).filter_map(|cell| cell.split_once(' ')).map(|c| c.0).collect();
+    assert_eq!(axes[1..], ["A1", "A2", "A3", "A4", "A5", "E1"], "{line}");
+    assert!(!files.contains_key("robotcal_plan.script"));
+}
+
 #[test]
 fn names_cannot_become_statements_of_the_planned_programs() {
     let mut request = request("ur10e", 4);

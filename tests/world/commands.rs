@@ -158,6 +158,9 @@ fn a_folder_of_results_stands_for_its_solution() {
         ["reports/kr6_small", "reports/kr6_small/solution.json"].map(|path| robotcal(&["show", "--json", &root(path)]));
     assert_eq!(of_folder.status.code(), Some(0), "{}", text(&of_folder));
     assert_eq!(of_folder.stdout, of_file.stdout);
+    let short = robotcal(&["show", &root("reports/kr6_small")]);
+    let report = Path::new(&root("reports/kr6_small")).join("report.html");
+    assert!(text(&short).contains(report.to_str().unwrap()), "{}", text(&short));
 }
 
 #[test]
@@ -183,6 +186,35 @@ fn doctor_names_all_that_is_missing_at_once() {
     assert_eq!(complete.status.code(), Some(0), "{}", text(&complete));
     let unknown = robotcal(&["doctor", &root("datasets/bad/unknown-joint"), "--urdf", &urdf]);
     assert_says(&text(&unknown), Code::JointMissing, &["joint_a3", "joint_x"]);
+}
+
+#[test]
+fn doctor_says_that_a_bag_of_ros_1_must_be_converted() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("run1.bag");
+    std::fs::write(&bag, "#ROSBAG V2.0\nrest").unwrap();
+    let output = robotcal(&["doctor", bag.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert_says(&text(&output), Code::RecordingFormat, &["run1.bag", "rosbags-convert"]);
+}
+
+#[test]
+fn a_sheet_is_turned_where_the_board_fits_only_so() {
+    let folder = tempfile::tempdir().unwrap();
+    for shape in ["6x9", "9x6"] {
+        let flags = ["--kind", "chessboard", "--sheet", "A4", "--shape", shape, "--pitch-mm", "20"];
+        let (output, made) = plate(folder.path(), &flags);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+        assert_eq!(made.unwrap().markers.len(), 54);
+        let drawing = std::fs::read_to_string(folder.path().join("plate/plate.svg")).unwrap();
+        let [width, height] = if shape == "6x9" { [210, 297] } else { [297, 210] };
+        assert!(drawing.contains(&format!("width=\"{width}mm\" height=\"{height}mm\"")), "{}", &drawing[..200]);
+        std::fs::remove_dir_all(folder.path().join("plate")).unwrap();
+    }
+    let (output, _) =
+        plate(folder.path(), &["--kind", "chessboard", "--id", "3", "--shape", "6x9", "--pitch-mm", "20"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert_says(&text(&output), Code::OptionConflict, &["--id"]);
 }
 
 #[test]

@@ -16,15 +16,14 @@ pub(super) fn module(route: &Route<'_>) -> Option<String> {
     let mut body = String::new();
     for (k, visit) in route.visits.iter().enumerate() {
         let shown = route.shown(&visit.readings);
-        let axes = route.by_axis(&shown);
+        let Axes { arm, external } = route.by_axis(&shown);
         let cells = |values: Vec<&f64>, most: usize, absent: &str| {
             let mut cells: Vec<String> = values.into_iter().map(|q| format!("{q:.5}")).collect();
             cells.resize(most, absent.to_owned());
-            cells
+            cells.join(",")
         };
-        let Axes { arm, external } =
-            Axes { arm: cells(axes.arm, ARM_AXES, "0"), external: cells(axes.external, EXTERNAL, ABSENT) };
-        targets += &format!("  CONST jointtarget p{k} := [[{}],[{}]];\n", arm.join(","), external.join(","));
+        let (arm, external) = (cells(arm, ARM_AXES, "0"), cells(external, EXTERNAL, ABSENT));
+        targets += &format!("  CONST jointtarget p{k} := [[{arm}],[{external}]];\n");
         if let Purpose::MovePlate(place, _) = &visit.purpose {
             let place = harmless(place);
             body += &format!("    TPWrite \"Move the plate to {place}, then start\";\n    Stop;\n");

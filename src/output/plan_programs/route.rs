@@ -2,7 +2,7 @@
 
 use crate::plan::order::motion;
 use crate::plan::{Plan, PlanRequest, image_name};
-use crate::urdf::JointKind;
+use crate::urdf::{Chain, JointKind};
 
 /// Name of the programs.
 pub(super) const NAME: &str = "robotcal_plan";
@@ -48,6 +48,8 @@ pub(super) struct Visit {
 pub(super) struct Route<'a> {
     pub joints: &'a [String],
     pub kinds: &'a [JointKind],
+    /// Leading joints that are not of the arm.
+    pub external: usize,
     pub visits: Vec<Visit>,
 }
 
@@ -55,7 +57,7 @@ pub(super) struct Route<'a> {
 pub(super) struct Axes<T> {
     /// Of the arm, A1 and so on.
     pub arm: Vec<T>,
-    /// External axes: a rail that carries the arm.
+    /// External axes: a rail that carries the arm, a positioner that carries the plate.
     pub external: Vec<T>,
 }
 
@@ -83,8 +85,16 @@ impl<'a> Route<'a> {
                 visits.push(Visit { readings, purpose, time_s: (length / SPEED).max(LEAST_TIME_S) });
             }
         }
-        Self { joints: &chain.readings, kinds: &chain.reading_kinds, visits }
+        Self { joints: &chain.readings, kinds: &chain.reading_kinds, external: external_axes(chain), visits }
     }
+}
+
+/// Number of leading readings that move what carries the plate, or slide the arm as a whole.
+fn external_axes(chain: &Chain) -> usize {
+    let climbed = chain.joints[..chain.climbed()].iter().filter_map(|joint| joint.drive);
+    let behind = climbed.map(|drive| drive.reading + 1).max().unwrap_or(0);
+    let slides = chain.reading_kinds[behind..].iter().take_while(|kind| **kind == JointKind::Prismatic).count();
+    behind + if slides <= MOST_SLIDES { slides } else { 0 }
 }
 
 impl Route<'_> {
@@ -103,9 +113,7 @@ impl Route<'_> {
 
     /// What stands in the order of the joints, by axes.
     pub fn by_axis<'a, T>(&self, all: &'a [T]) -> Axes<&'a T> {
-        let leading = self.kinds.iter().take_while(|kind| **kind == JointKind::Prismatic).count();
-        let slides = if leading <= MOST_SLIDES { leading } else { 0 };
-        let (external, arm) = all.split_at(slides.min(all.len()));
+        let (external, arm) = all.split_at(self.external.min(all.len()));
         Axes { arm: arm.iter().collect(), external: external.iter().collect() }
     }
 
