@@ -190,6 +190,11 @@ limits! {
     same_work_rad: f64 = 0.1;
     /// Distance between the tool of a program and the measured one beyond which they are not the same, m.
     same_tool_m: f64 = 0.05;
+    /// Angle between them, where the measured one has an orientation.
+    same_tool_rad: f64 = 0.1;
+    /// How many times nearer to a measured frame than the next one a frame of a program must be to count as that one: a cell is off by
+    /// less than a third of what lies between two of its frames, or nothing tells them apart.
+    frame_clearly_nearer: f64 = 3.0;
 
     /// Fewest observations of an image that takes part: four give its pose, two more a margin.
     image_observations: usize = 6;

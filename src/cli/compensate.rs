@@ -176,7 +176,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     };
     let choice = Choice::read(args.frames.as_deref(), args.from_frames.as_deref(), &sides)?;
     let framed = choice.framed(&sides)?;
-    let frames = choice.measured((setting.tool, setting.work));
+    let frames = choice.measured(language, &setting);
     let models = Models {
         controller: &controller,
         from: from.as_ref().unwrap_or(&controller),

@@ -13,7 +13,9 @@ use crate::output::frames_record::{self, FramesRecord, ToolKind};
 use crate::output::restore::found_model;
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::programs::compensate::Compensated;
-use crate::programs::{KnownError, MeasuredFrames, MeasuredTool, Program, RobotFrames};
+use crate::programs::{
+    KnownError, Language, MeasuredFrames, MeasuredTool, Program, ProgramSetting, RobotFrames, SameFrames,
+};
 use crate::urdf::Chain;
 
 /// One of the calibrated robots.
@@ -110,18 +112,22 @@ impl Choice {
         Ok(())
     }
 
-    /// What takes the place of the program's own frames; `own` are tool and work object of joint targets, where they are known.
-    pub fn measured(&self, own: (Option<Pose>, Option<Pose>)) -> Option<MeasuredFrames> {
+    /// What takes the place of the program's own frames.
+    pub fn measured(&self, language: Language, setting: &ProgramSetting) -> Option<MeasuredFrames> {
         let Self::Measured { to, from } = self else { return None };
         let limits = Limits::default();
         Some(MeasuredFrames {
             to: frames_of(to),
             from: from.as_ref().map(|f| frames_of(f)),
             base_within: to.work_is_base().then_some((limits.same_tool_m, limits.same_work_rad)),
-            tool: own.0,
-            work: own.1,
-            same_work: (limits.same_work_m, limits.same_work_rad),
-            same_tool_m: limits.same_tool_m,
+            tool: setting.tool,
+            work: setting.work.map(|work| setting.base * work),
+            unsaid: (language == Language::UrScript).then_some(setting.base),
+            same: SameFrames {
+                work: (limits.same_work_m, limits.same_work_rad),
+                tool: (limits.same_tool_m, limits.same_tool_rad),
+                clearly_nearer: limits.frame_clearly_nearer,
+            },
         })
     }
 
@@ -196,7 +202,7 @@ fn frames_of(record: &FramesRecord) -> RobotFrames {
     let tool = record.tool.as_ref().map(|t| {
         let pose = Pose::from(&t.pose);
         match t.measured {
-            ToolKind::Point => MeasuredTool::Point(pose.translation),
+            ToolKind::Point | ToolKind::GivenPoint => MeasuredTool::Point(pose.translation),
             ToolKind::Pose | ToolKind::Given => MeasuredTool::Pose(pose),
         }
     });

@@ -298,6 +298,7 @@ fn work_name(touches: &Touches) -> String {
 
 fn tool_record(args: &FramesArgs, record: &SolutionRecord, fit: &FrameFit, touches: &Touches) -> ToolRecord {
     let measured = match &fit.tool_covariances[0] {
+        None if args.tool.len() == 3 => ToolKind::GivenPoint,
         None => ToolKind::Given,
         Some(_) if touches.is_pose(0) => ToolKind::Pose,
         Some(_) => ToolKind::Point,

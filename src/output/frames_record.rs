@@ -38,6 +38,8 @@ pub enum ToolKind {
     Pose,
     /// It was given, and nothing of it was measured.
     Given,
+    /// Its position was given without an orientation.
+    GivenPoint,
 }
 
 /// How a work object was found.

@@ -13,7 +13,7 @@ use nalgebra::Vector6;
 use super::codes::Branch;
 use super::field::{Edit, FieldPlace, splice};
 use super::meant::{Meant, meant};
-use super::measured_frames::{KnownError, MeasuredFrames, Moved};
+use super::measured_frames::{FramesOfProgram, KnownError, MeasuredFrames, Moved};
 use super::posture::{Finder, Known, is_parted, smallest_singular_value};
 use super::program::{
     Approach, DisplacedTarget, Left, PoseTarget, Program, Target, TargetKind, Understood, write_joints,
@@ -150,7 +150,7 @@ impl Compensated {
 
 /// Corrects every target of a program, in the order of visiting.
 pub fn compensate(program: &Program, models: Models<'_>, postures: &Postures) -> Compensated {
-    let mut work = Work::new(models);
+    let mut work = Work::new(models, program);
     let mut edits = program.edits.clone();
     let mut outcomes = Vec::with_capacity(program.targets.len());
     let mut displaced = Vec::new();
@@ -217,6 +217,7 @@ type Reached = Option<(Vec<f64>, Vec<f64>)>;
 /// The way through a program.
 struct Work<'a> {
     models: Models<'a>,
+    frames: Option<FramesOfProgram<'a>>,
     /// Limits of the robot that runs the program; joints without any have none.
     limits: Vec<(f64, f64)>,
     /// One for each target so far.
@@ -229,10 +230,11 @@ struct Work<'a> {
 type Worked = (Correction, Vec<Edit>, Option<Later>);
 
 impl<'a> Work<'a> {
-    fn new(models: Models<'a>) -> Self {
+    fn new(models: Models<'a>, program: &Program) -> Self {
         let limits = inverse::stated_limits(&models.to.chain);
         let limits: Vec<_> = limits.into_iter().map(|l| l.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))).collect();
-        Self { models, limits, places: Vec::new(), written: BTreeMap::new() }
+        let frames = models.frames.map(|measured| FramesOfProgram::new(measured, &program.targets));
+        Self { models, frames, limits, places: Vec::new(), written: BTreeMap::new() }
     }
 
     fn target(&mut self, target: &Target, meant: Understood<Meant>, program: &Program) -> Understood<Worked> {
@@ -249,7 +251,7 @@ impl<'a> Work<'a> {
         let Meant { kind, readings: programmed, held, known } = meant;
         let kind = &kind;
         let meant = reach(self.models.from, &self.limits, &held, programmed_before.as_deref()).stop(&programmed);
-        let moved = self.models.frames.map_or_else(|| Ok(Moved::none()), |f| f.moved(kind))?;
+        let moved = self.frames.as_ref().map_or_else(|| Ok(Moved::none()), |f| f.moved(kind))?;
         let taught = self.models.from.pose_at(&meant, &vec![0.0; programmed.len()]);
         let taught = self.models.beyond(0, &programmed, 1.0, taught);
         let wanted = self.models.beyond(1, &programmed, -1.0, moved.applied(&taught));

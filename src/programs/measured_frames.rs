@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::program::{TargetKind, Understood};
+use super::frame_candidates::{Candidates, Reference};
+use super::program::{Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
 
@@ -22,7 +23,7 @@ pub enum MeasuredTool {
 }
 
 impl MeasuredTool {
-    fn point(&self) -> Vector3<f64> {
+    pub(super) fn point(&self) -> Vector3<f64> {
         match self {
             Self::Point(point) => *point,
             Self::Pose(pose) => pose.translation,
@@ -56,14 +57,25 @@ pub struct MeasuredFrames {
     pub from: Option<RobotFrames>,
     /// Where the places are given in the base itself: distance and angle from the base of the model beyond which it is another frame, m and rad.
     pub base_within: Option<(f64, f64)>,
-    /// Tool of targets that are joint values, where it is known.
+    /// The tool as the user states it: that of targets that are joint values, and the one that was measured where the program has several.
     pub tool: Option<Pose>,
-    /// Their work object.
+    /// The work object, likewise.
     pub work: Option<Pose>,
-    /// Distance and angle from the program's work object to the measured one beyond which they are not the same, m and rad.
-    pub same_work: (f64, f64),
-    /// Distance from the program's tool to the measured one beyond which they are not the same, m.
-    pub same_tool_m: f64,
+    /// The frame of poses that are on the stated work object though their text cannot say so: the base, of URScript.
+    pub unsaid: Option<Pose>,
+    /// What says that two frames are the same.
+    pub same: SameFrames,
+}
+
+/// Distance (m) and angle (rad) from the program's frames to the measured ones beyond which they are not the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SameFrames {
+    /// Of work objects.
+    pub work: (f64, f64),
+    /// Of tools.
+    pub tool: (f64, f64),
+    /// Of several frames of a program within them, how many times nearer than the next one the nearest must be to count as the measured one.
+    pub clearly_nearer: f64,
 }
 
 /// What becomes of the pose of the flange that a target means: `base * pose * tool`.
@@ -87,62 +99,94 @@ impl Moved {
     }
 }
 
-impl MeasuredFrames {
+/// The measured frames beside those of one program.
+#[derive(Debug, Clone)]
+pub(super) struct FramesOfProgram<'a> {
+    measured: &'a MeasuredFrames,
+    tools: Candidates,
+    works: Candidates,
+}
+
+/// A tool and a work object of a program: `flange_from_tool`, `base_from_work`, where they are known.
+fn own_frames(kind: &TargetKind, measured: &MeasuredFrames) -> (Option<Pose>, Option<Pose>) {
+    match kind {
+        TargetKind::Pose(pose) => {
+            let stated = measured.work.filter(|_| measured.unsaid == Some(pose.base_from_work));
+            (Some(pose.flange_from_tool), stated.or(Some(pose.base_from_work)))
+        }
+        TargetKind::Joints(_) => (measured.tool, measured.work),
+    }
+}
+
+impl<'a> FramesOfProgram<'a> {
+    /// Looks which frames of a program stand for the measured ones.
+    pub fn new(measured: &'a MeasuredFrames, targets: &[Target]) -> Self {
+        let (mut tools, mut works) = (Vec::new(), Vec::new());
+        for target in targets {
+            let (tool, work) = own_frames(&target.kind, measured);
+            tools.extend(tool);
+            works.extend(work);
+        }
+        let tool = measured.to.tool.map(|to| Reference::tool(to, &measured.same));
+        let work = measured.to.work.map(|to| Reference::work(to, &measured.same));
+        let clearly = measured.same.clearly_nearer;
+        Self {
+            measured,
+            tools: Candidates::of(&tools, tool, measured.tool, clearly),
+            works: Candidates::of(&works, work, measured.work, clearly),
+        }
+    }
+
     /// What becomes of a target; else why it cannot be told.
-    pub(super) fn moved(&self, kind: &TargetKind) -> Understood<Moved> {
-        let (own_tool, own_work) = match kind {
-            TargetKind::Pose(pose) => (Some(pose.flange_from_tool), Some(pose.base_from_work)),
-            TargetKind::Joints(_) => (self.tool, self.work),
-        };
-        let tool = match (&self.to.tool, self.from.as_ref().map(|f| f.tool)) {
-            (None, _) => Pose::identity(),
-            (Some(to), Some(Some(from))) => from.onto(to),
-            (Some(to), _) => {
-                let own = own_tool.ok_or_else(|| {
-                    let words = "the tool was measured, and the text does not tell which tool these joints mean: give it with --tool";
-                    Why::new(LeftReason::ToolUnknown, words)
-                })?;
-                let apart = (own.translation - to.point()).norm();
-                if apart > self.same_tool_m {
-                    let words = format!("its tool lies {:.1} mm from the measured one: another tool", 1e3 * apart);
-                    return Err(Why::new(LeftReason::ToolUnknown, words));
-                }
-                MeasuredTool::Pose(own).onto(to)
-            }
-        };
-        let base = match (&self.to.work, self.from.as_ref().map(|f| f.work)) {
-            (None, _) => Pose::identity(),
-            (Some(to), Some(Some(from))) => *to * from.inverse(),
-            (Some(to), _) if self.base_within.is_some() => {
-                let (rad, m) = to.distance(&Pose::identity());
-                if self.base_within.is_some_and(|within| m > within.0 || rad > within.1) {
-                    let words = format!(
-                        "the touched places are said to stand in the base, and their frame lies {:.0} mm and {:.1} degrees from it: name the frame that they stand in ([contact] frame)",
-                        1e3 * m,
-                        rad.to_degrees()
-                    );
-                    return Err(Why::new(LeftReason::FrameUnknown, words));
-                }
-                *to
-            }
-            (Some(to), _) => {
-                let own = own_work.ok_or_else(|| {
-                    let words = "the work object was measured, and the text does not tell which one these joints mean: give it with --work";
-                    Why::new(LeftReason::FrameUnknown, words)
-                })?;
-                let (rad, m) = own.distance(to);
-                if m > self.same_work.0 || rad > self.same_work.1 {
-                    let words = format!(
-                        "its work frame lies {:.0} mm and {:.1} degrees from the measured one: another work object",
-                        1e3 * m,
-                        rad.to_degrees()
-                    );
-                    return Err(Why::new(LeftReason::FrameUnknown, words));
-                }
-                *to * own.inverse()
-            }
-        };
-        let point = self.to.tool.map(|t| Pose::new(Matrix3::identity(), t.point()));
+    pub fn moved(&self, kind: &TargetKind) -> Understood<Moved> {
+        let (own_tool, own_work) = own_frames(kind, self.measured);
+        let (tool, base) = (self.tool(own_tool)?, self.base(own_work)?);
+        let point = self.measured.to.tool.map(|t| Pose::new(Matrix3::identity(), t.point()));
         Ok(Moved { base, tool, flange_from_tool: point.or(own_tool).unwrap_or_else(Pose::identity) })
+    }
+
+    fn tool(&self, own: Option<Pose>) -> Understood<Pose> {
+        let from = self.measured.from.as_ref().map(|f| f.tool);
+        let (to, own) = match (&self.measured.to.tool, from) {
+            (None, _) => return Ok(Pose::identity()),
+            (Some(to), Some(Some(from))) => return Ok(from.onto(to)),
+            (Some(to), _) => (to, own),
+        };
+        let unknown = |words: String| Why::new(LeftReason::ToolUnknown, words);
+        let own = own.ok_or_else(|| {
+            unknown(
+                "the tool was measured, and the text does not tell which tool these joints mean: give it with --tool"
+                    .into(),
+            )
+        })?;
+        self.tools.check(&own).map_err(|why| unknown(why.in_words("tool", "--tool")))?;
+        Ok(MeasuredTool::Pose(own).onto(to))
+    }
+
+    fn base(&self, own: Option<Pose>) -> Understood<Pose> {
+        let from = self.measured.from.as_ref().map(|f| f.work);
+        let unknown = |words: String| Why::new(LeftReason::FrameUnknown, words);
+        let to = match (&self.measured.to.work, from) {
+            (None, _) => return Ok(Pose::identity()),
+            (Some(to), Some(Some(from))) => return Ok(*to * from.inverse()),
+            (Some(to), _) => to,
+        };
+        if let Some(within) = self.measured.base_within {
+            let (rad, m) = to.distance(&Pose::identity());
+            if m > within.0 || rad > within.1 {
+                let words = format!(
+                    "the touched places are said to stand in the base, and their frame lies {:.0} mm and {:.1} degrees from it: name the frame that they stand in ([contact] frame)",
+                    1e3 * m,
+                    rad.to_degrees()
+                );
+                return Err(unknown(words));
+            }
+            return Ok(*to);
+        }
+        let own = own.ok_or_else(|| {
+            unknown("the work object was measured, and the text does not tell which one these joints mean: give it with --work".into())
+        })?;
+        self.works.check(&own).map_err(|why| unknown(why.in_words("work object", "--work")))?;
+        Ok(*to * own.inverse())
     }
 }

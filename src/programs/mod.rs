@@ -7,7 +7,7 @@
 //! | [`codes`] | status and turn, confdata: which posture a pose means |
 //! | [`posture`] | which joints a pose means |
 //! | `meant` | the same from wherever the robot comes |
-//! | [`measured_frames`] | tool and work object of the real robot instead of those of the program |
+//! | [`measured_frames`], `frame_candidates` | tool and work object of the real robot instead of those of the program, and which of these they are |
 //! | [`mod@compensate`] | targets of one robot to targets of another |
 //! | `flow` | what statements set, followed through branches, loops and calls |
 //! | `references` | what routines change that is given them by reference |
@@ -22,6 +22,7 @@ pub mod codes;
 pub mod compensate;
 pub mod field;
 mod flow;
+mod frame_candidates;
 mod itinerary;
 mod krl;
 mod language;
@@ -41,7 +42,7 @@ mod urscript;
 
 pub use compensate::{Correction, Models, Postures, TargetOutcome, compensate};
 pub use language::{Language, read};
-pub use measured_frames::{KnownError, MeasuredFrames, MeasuredTool, RobotFrames};
+pub use measured_frames::{KnownError, MeasuredFrames, MeasuredTool, RobotFrames, SameFrames};
 pub use posture::Known;
 pub use program::{Left, Program, Target, TargetKind};
 pub use reason::{DeclaredPoint, LeftReason, Why};

@@ -16,6 +16,10 @@ use crate::urdf::JointKind;
 
 /// Random starts for the joints of a pose that no earlier target is near to.
 const STARTS: usize = 200;
+/// Joints that are stated beside a pose are nearer than this to those that reach it, rad.
+const FARTHEST_STATED_RAD: f64 = 0.5;
+/// Joints that are stated beside a pose are nearer than this to those that reach it, rad.
+const FARTHEST_STATED_RAD: f64 = 0.5;
 /// Seed of these starts.
 const SEED: u64 = 5;
 /// A solution in which no joint is further (rad or m) from where the robot comes is of the same posture.
@@ -171,6 +175,11 @@ fn by_way(coded: Understood<Posture>, way: Option<Vec<f64>>, codes: &Codes) -> U
     }
 }
 
+fn contradicted() -> Why {
+    let words = "the joints beside the pose are far from those that reach it: pose or joints are of another row, or its tool or work frame is another one (--tool, --work; without them it is the pose of the flange)";
+    Why::new(LeftReason::PostureUnknown, words)
+}
+
 impl<'a> Finder<'a> {
     pub fn new(robot: &'a Robot, limits: &[(f64, f64)], start: Option<&'a [f64]>) -> Self {
         let ranges = inverse::reading_limits(&robot.chain);
@@ -196,12 +205,23 @@ impl<'a> Finder<'a> {
                 let way = before.readings.filter(|_| before.straight).and_then(|q| self.along(pose, held, q));
                 by_way(self.by_codes(pose, held, before, (codes, axes)), way, codes)
             }
-            (MeantPosture::Near(q), _) => Ok((self.near(pose, held, q, false)?, Known::Near)),
+            (MeantPosture::Near(q), _) => {
+                let found = self.near(pose, held, q, false)?;
+                self.is_beside(pose, q, &found).then_some((found, Known::Near)).ok_or_else(contradicted)
+            }
             (MeantPosture::Nearest | MeantPosture::Along, Some(q)) => {
                 Ok((self.near(pose, held, q, false)?, Known::Taught))
             }
             (MeantPosture::Nearest | MeantPosture::Along, None) => self.by_approach(pose, held, before),
         }
+    }
+
+    /// False where the columns of a table state joints that are far from those that reach the pose of the row.
+    fn is_beside(&self, pose: &PoseTarget, stated: &[f64], found: &[f64]) -> bool {
+        let is_stated = pose.joint_fields.iter().any(Option::is_some);
+        let kinds = &self.robot.chain.reading_kinds;
+        let mut angles = stated.iter().zip(found).zip(kinds).filter(|(_, kind)| **kind != JointKind::Prismatic);
+        !is_stated || angles.all(|((stated, found), _)| (stated - found).abs() < FARTHEST_STATED_RAD)
     }
 
     /// The posture that goes on from the target before, or the one next to `--start`.

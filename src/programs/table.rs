@@ -4,6 +4,7 @@
 //! columns with the result, and joint columns that are there already say which posture is meant.
 
 use std::ops::Range;
+use std::path::Path;
 
 use super::ProgramSetting;
 use super::field::{Edit, Field, FieldPlace};
@@ -11,6 +12,7 @@ use super::program::{Approach, JointTarget, MeantPosture, PoseTarget, Program, R
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result, closest_name, renaming};
 use crate::geom::Pose;
+use crate::series::{AngleUnit, check_unit};
 use crate::urdf::JointKind;
 
 const POSE_COLUMNS: [&str; 7] = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"];
@@ -137,6 +139,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
             let approach = if k > 0 { Approach::From(targets.len() - 1) } else { Approach::Unknown };
             targets.push(table.target(row, approach)?);
         }
+        table.check_unit(&targets)?;
     }
     program.targets = targets;
     Ok(program)
@@ -180,6 +183,25 @@ impl Table<'_> {
         let units = self.units()?;
         let field = |(&column, (si, decimals)): (&usize, (f64, usize))| self.field(row, column, si, decimals);
         self.columns.joints.iter().zip(units).map(field).collect()
+    }
+
+    /// Refuses joint columns that cannot be in the stated unit.
+    fn check_unit(&self, targets: &[Target]) -> Result<()> {
+        let Some(rad) = self.setting.rad_per_unit else { return Ok(()) };
+        let fields = |target: &Target| match &target.kind {
+            TargetKind::Joints(joints) => joints.fields.clone(),
+            TargetKind::Pose(pose) => pose.joint_fields.clone(),
+        };
+        let of_file = targets.iter().filter(|target| target.file == self.index);
+        let rows: Vec<Vec<f64>> = of_file
+            .map(|target| fields(target).iter().flatten().map(|field| field.written).collect())
+            .filter(|row: &Vec<f64>| row.iter().all(|q| q.is_finite()))
+            .collect();
+        let unit = if rad == 1.0 { AngleUnit::Rad } else { AngleUnit::Deg };
+        let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
+        check_unit(Path::new(&self.file.name), unit, self.setting.chain, &rows, |unit| {
+            format!("give --joint-unit {unit}")
+        })
     }
 
     /// SI value and decimals of every reading's unit.

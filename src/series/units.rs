@@ -21,7 +21,7 @@ const SOFT_LIMITS_M: f64 = 0.01;
 const LENGTHS: [(&str, &str, f64); 3] =
     [("millimetres", "mm", 1e-3), ("centimetres", "cm", 1e-2), ("inches", "inch", 0.0254)];
 /// Fewer stops than this say nothing about their unit.
-const MANY_STOPS: usize = 5;
+const MANY_STOPS: usize = 3;
 
 /// Readings of every stop in the order of `Chain::readings`, rad and m; `None` for images taken off the robot.
 ///

@@ -14,6 +14,7 @@ use robotcal::geom::Pose;
 use robotcal::identify::touch_mistake;
 use robotcal::model::inverse::{reading_limits, solve_from};
 use robotcal::model::robot::Robot;
+use robotcal::output::frames_record::{self, ToolKind};
 use robotcal::output::restore::found_model;
 use robotcal::output::solution_json;
 use robotcal::output::work_findings::from_below;
@@ -287,6 +288,22 @@ fn places_of_another_frame_than_the_base_are_told() {
     assert_eq!(left, ["frame_unknown"]);
 }
 
+/// Three numbers say where a tool is, not how it is turned.
+#[test]
+fn a_tool_that_is_given_by_its_point_has_no_orientation() {
+    let Files { folder, touches, .. } = files("fixture", work(), 9);
+    let [solution, touches] = [&repo(SOLUTION), &touches].map(|p| p.to_str().unwrap().to_owned());
+    let kind = |tool: &str| {
+        let flag = format!("--tool={tool}");
+        let run = robotcal(&["frames", "--from", &solution, "--touches", &touches, &flag], &folder.path().join("out"));
+        let record = frames_record::read(&run.expect(0).file("frames.json")).unwrap();
+        record.tool.unwrap().measured
+    };
+    let point = TOOL.map(|v| v.to_string()).join(",");
+    assert_eq!(kind(&point), ToolKind::GivenPoint);
+    assert_eq!(kind(&format!("{point},0,0,90")), ToolKind::Given);
+}
+
 /// By mirrored coordinates a plane looks the other way: nothing but the side of the tool tells.
 #[test]
 fn places_of_a_plane_that_were_touched_from_below_are_told() {
@@ -308,7 +325,8 @@ fn places_of_a_plane_that_were_touched_from_below_are_told() {
             let Seen::Point(place) = &mut touch.seen else { panic!("a place") };
             place.y = -place.y;
         }
-        let found = fit(&robot, &touches, &Given::default(), &Limits::default()).unwrap();
+        let given = Given { tool: Some(tool), ..Given::default() };
+        let found = fit(&robot, &touches, &given, &Limits::default()).unwrap();
         let told = from_below(robot.exported(), &found, &touches, "touches");
         let code = told.map(|finding| (finding.code, finding.weight));
         assert_eq!(code, mirrored.then_some((Code::TouchedFromBelow, Weight::Note)));

@@ -23,6 +23,7 @@ mod rapid_statements;
 mod references;
 mod retarget;
 mod scopes;
+mod several_frames;
 mod urscript;
 mod used;
 mod ways;

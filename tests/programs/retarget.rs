@@ -4,7 +4,8 @@ use nalgebra::Vector6;
 use robotcal::geom::Pose;
 use robotcal::model::robot::Robot;
 use robotcal::programs::{
-    self, Language, LeftReason, MeasuredFrames, Models, Postures, ProgramSetting, RobotFrames, TargetOutcome, TextFile,
+    self, Language, LeftReason, MeasuredFrames, Models, Postures, ProgramSetting, RobotFrames, SameFrames,
+    TargetOutcome, TextFile,
 };
 use robotcal::urdf::{Chain, read};
 
@@ -33,8 +34,8 @@ fn outcomes(name: &str, text: String, to: &Robot, from: &Chain, moved: Option<Po
         base_within: None,
         tool: None,
         work: None,
-        same_work: (0.0, 0.0),
-        same_tool_m: 0.0,
+        unsaid: None,
+        same: SameFrames { work: (0.0, 0.0), tool: (0.0, 0.0), clearly_nearer: 1.0 },
     });
     let file = TextFile { name: name.into(), bytes: text.into_bytes() };
     let program = programs::read(language, vec![file], &setting).unwrap();

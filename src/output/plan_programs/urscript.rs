@@ -8,7 +8,7 @@ const AXES: usize = 6;
 
 /// The script; `None` for an arm that is not one of six revolute joints.
 pub(super) fn script(route: &Route<'_>) -> Option<String> {
-    if route.joints.len() != AXES || route.kinds.contains(&JointKind::Prismatic) {
+    if route.joints.len() != AXES || !route.is_of_six(0) || route.kinds.contains(&JointKind::Prismatic) {
         return None;
     }
     let mut text = format!("def {NAME}():\n  # Joints in order: {}\n", route.joint_list());

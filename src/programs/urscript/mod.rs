@@ -476,7 +476,7 @@ impl Script<'_> {
         PoseTarget {
             position: [x, y, z],
             rotation: RotationFields::Vector([rx, ry, rz]),
-            base_from_work: self.setting.base * self.setting.work.unwrap_or_else(Pose::identity),
+            base_from_work: self.setting.base,
             flange_from_tool: tool,
             fixed: vec![None; readings],
             posture,
