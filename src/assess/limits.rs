@@ -37,6 +37,10 @@ limits! {
     unusual_joint_noise: f64 = 5e-4;
     /// Share of the stops, whose poses were read, in other postures from which a choice as good leaves open which robot is the right one.
     open_postures: f64 = 0.25;
+    /// Gain of the log likelihood by a tool on the flange from which the poses of a controller are taken for those of that tool.
+    tool_log_odds: f64 = 20.0;
+    /// Its distance from the flange in sigmas from which that is told.
+    tool_sigmas: f64 = 4.0;
     /// Sigma of the flange that is no reason to distrust, mm: what nominal robots miss by.
     flange_sigma_mm: f64 = 1.0;
     /// Share of the robot's images that may be left out in a result worth having.

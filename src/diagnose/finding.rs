@@ -30,6 +30,7 @@ use super::plate_size::DoubtedSize;
 use super::scatter::LargeScatter;
 use super::stated_noise::NoiseContradicted;
 use super::tag_size::TagsOff;
+use super::tool_in_poses::ToolInPoses;
 use super::undetermined::FlangeUndetermined;
 use super::zero_moved::ZeroMoved;
 use super::zeros_off::ZeroOff;
@@ -89,6 +90,7 @@ findings! {
     ParameterOff,
     ResidualPattern,
     TagsOff,
+    ToolInPoses,
     ZeroMoved,
     ZeroOff,
 }

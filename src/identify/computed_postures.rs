@@ -27,8 +27,8 @@ use crate::diagnose::ComputedPostures;
 use crate::error::Result;
 use crate::fit::FreePoses;
 use crate::linalg::SymmetricFactor;
-use crate::model::robot::{Posture, Robot};
-use crate::problem::{Adjustment, MeasuredSeries, TakenFrom};
+use crate::model::robot::{LinearOrigins, Posture, Robot};
+use crate::problem::{Adjustment, MeasuredSeries, State, TakenFrom};
 use crate::stage::stage;
 
 /// Noise of the readings of the stops that are compared, rad or m.
@@ -42,12 +42,78 @@ const TURNS: usize = 50;
 /// Share of the information that holds what nothing tells.
 const HELD: f64 = 1e-12;
 
+/// The robot at its start beside free camera poses: what stops are compared by.
+pub(super) struct Compared {
+    pub adjustment: Adjustment,
+    free: FreePoses,
+    columns: Vec<usize>,
+    /// Prior information of the parameters.
+    pub prior: DVector<f64>,
+    /// Images of every stop.
+    pub stops: Vec<Vec<usize>>,
+}
+
+impl Compared {
+    /// `hold` holds the columns that are not to be fitted.
+    pub fn of(
+        robot: &Robot,
+        series: &[MeasuredSeries],
+        limits: &Limits,
+        hold: impl FnOnce(&mut Adjustment) -> Result<()>,
+    ) -> Option<Self> {
+        let (mut adjustment, free, mut verdicts) = free_poses_of(robot, series, limits, hold).ok()?;
+        start_robot(&mut adjustment, &free, StartGiven { series, limits }, &mut verdicts).ok()?;
+        let layout = &adjustment.problem.layout;
+        let columns: Vec<usize> = (0..layout.theta_len()).filter(|&c| layout.columns[c].free).collect();
+        let prior = columns.iter().map(|&c| layout.columns[c].prior_sigma.powi(-2));
+        let prior = DVector::from_iterator(columns.len(), prior);
+        let mut by_stop: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for i in adjustment.problem.used_on_robot() {
+            by_stop.entry(adjustment.problem.images[i].stop).or_default().push(i);
+        }
+        let stops = by_stop.into_values().collect();
+        Some(Self { adjustment, free, columns, prior, stops })
+    }
+
+    /// `V^-1/2 G` and `V^-1/2 e` of the images of a stop at some readings, by the unknowns of a state.
+    pub fn seen_at(
+        &self,
+        (state, origins): (&State, &LinearOrigins),
+        images: &[usize],
+        readings: &[f64],
+    ) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let problem = &self.adjustment.problem;
+        let read = problem.stops[problem.images[*images.first()?].stop].posture.as_ref()?;
+        let (posture, zeros) = (approached(read, readings), vec![0.0; readings.len()]);
+        let mut g = DMatrix::zeros(6 * images.len(), self.columns.len());
+        let mut e = DVector::zeros(6 * images.len());
+        for (k, &i) in images.iter().enumerate() {
+            let pose = self.free.poses[i].as_ref()?;
+            let from = TakenFrom::rigid(&posture, &zeros);
+            let chained = state.chained_from(origins, &problem.layout, &problem.images[i], from)?;
+            let by_readings = chained.d_latent.columns(0, readings.len()) * JOINT_SIGMA;
+            let noise =
+                pose.covariance + Matrix6::from_column_slice((&by_readings * by_readings.transpose()).as_slice());
+            let root = noise.cholesky()?.l().try_inverse()?;
+            e.rows_mut(6 * k, 6).copy_from(&(root * (chained.pose.inverse() * pose.camera_from_plate).log()));
+            g.rows_mut(6 * k, 6).copy_from(&(root * chained.d_theta.select_columns(&self.columns)));
+        }
+        Some((g, e))
+    }
+}
+
 /// What the images say of one posture of a stop.
 struct Candidate {
     readings: Vec<f64>,
     /// `V^-1/2 G` and `V^-1/2 e` of all images of the stop.
     g: DMatrix<f64>,
     e: DVector<f64>,
+}
+
+impl Candidate {
+    fn equations(&self) -> (&DMatrix<f64>, &DVector<f64>) {
+        (&self.g, &self.e)
+    }
 }
 
 /// A stop whose pose was read.
@@ -92,7 +158,8 @@ pub(super) fn told_by_images<'a>(
         return unchanged;
     }
     let _stage = stage("postures");
-    let Some(stops) = Stops::of(robot, series, limits, hold) else { return unchanged };
+    let compared = Compared::of(robot, series, limits, hold);
+    let Some(stops) = compared.and_then(|compared| Stops::of(&compared, series)) else { return unchanged };
     let Some((chosen, is_open)) = stops.chosen(from, limits) else { return unchanged };
     let mut told = series.to_vec();
     let mut changed = 0;
@@ -138,25 +205,10 @@ impl Told {
 }
 
 impl Stops {
-    fn of(
-        robot: &Robot,
-        series: &[MeasuredSeries],
-        limits: &Limits,
-        hold: impl FnOnce(&mut Adjustment) -> Result<()>,
-    ) -> Option<Self> {
-        let (mut adjustment, free, mut verdicts) = free_poses_of(robot, series, limits, hold).ok()?;
-        start_robot(&mut adjustment, &free, StartGiven { series, limits }, &mut verdicts).ok()?;
-        let layout = &adjustment.problem.layout;
-        let columns: Vec<usize> = (0..layout.theta_len()).filter(|&c| layout.columns[c].free).collect();
-        let prior = columns.iter().map(|&c| layout.columns[c].prior_sigma.powi(-2));
-        let prior = DVector::from_iterator(columns.len(), prior);
-        let mut by_stop: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for i in adjustment.problem.used_on_robot() {
-            by_stop.entry(adjustment.problem.images[i].stop).or_default().push(i);
-        }
-        let of = |images: Vec<usize>| stop(&adjustment, &free, series, &images, &columns);
-        let all: Vec<Stop> = by_stop.into_values().collect::<Vec<_>>().into_par_iter().filter_map(of).collect();
-        (!all.is_empty()).then_some(Self { all, prior })
+    fn of(compared: &Compared, series: &[MeasuredSeries]) -> Option<Self> {
+        let of = |images: &Vec<usize>| stop(compared, series, images);
+        let all: Vec<Stop> = compared.stops.par_iter().filter_map(of).collect();
+        (!all.is_empty()).then_some(Self { all, prior: compared.prior.clone() })
     }
 
     /// The best choice, of those that are as good the one with most postures as they are, from those of a fit the one nearest to it; and whether
@@ -204,7 +256,7 @@ impl Stops {
     /// What a choice says of the parameters.
     fn told_by(&self, postures: &[usize]) -> Knowledge {
         let mut known = Knowledge::of_priors(&self.prior);
-        self.all.iter().zip(postures).for_each(|(stop, &c)| known.add(&stop.candidates[c], 1.0));
+        self.all.iter().zip(postures).for_each(|(stop, &c)| known.add(stop.candidates[c].equations(), 1.0));
         known
     }
 
@@ -235,14 +287,14 @@ impl Stops {
         for _ in 0..TURNS {
             let mut is_changed = false;
             for (stop, c) in self.all.iter().zip(&mut postures) {
-                known.add(&stop.candidates[*c], -1.0);
+                known.add(stop.candidates[*c].equations(), -1.0);
                 let costs = stop.predicted(&known)?;
                 let best = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(*c);
                 if costs[best] < costs[*c] {
                     *c = best;
                     is_changed = true;
                 }
-                known.add(&stop.candidates[*c], 1.0);
+                known.add(stop.candidates[*c].equations(), 1.0);
             }
             if !is_changed {
                 break;
@@ -255,38 +307,38 @@ impl Stops {
     fn without_doubtful(&self, mut postures: Vec<usize>, as_good: f64) -> Option<Vec<usize>> {
         let mut known = self.told_by(&postures);
         for (stop, c) in self.all.iter().zip(&mut postures).filter(|(_, c)| **c > 0) {
-            known.add(&stop.candidates[*c], -1.0);
+            known.add(stop.candidates[*c].equations(), -1.0);
             let costs = stop.predicted(&known)?;
             if costs[0] <= costs[*c] + as_good {
                 *c = 0;
             }
-            known.add(&stop.candidates[*c], 1.0);
+            known.add(stop.candidates[*c].equations(), 1.0);
         }
         Some(postures)
     }
 }
 
 /// Normal equations of the parameters.
-struct Knowledge {
+pub(super) struct Knowledge {
     information: DMatrix<f64>,
-    rhs: DVector<f64>,
-    squares: f64,
+    pub rhs: DVector<f64>,
+    pub squares: f64,
 }
 
 impl Knowledge {
-    fn of_priors(prior: &DVector<f64>) -> Self {
+    pub fn of_priors(prior: &DVector<f64>) -> Self {
         let n = prior.len();
         Self { information: DMatrix::from_diagonal(prior), rhs: DVector::zeros(n), squares: 0.0 }
     }
 
     /// Takes a posture of a stop in, or by a weight of -1 out again.
-    fn add(&mut self, Candidate { g, e, .. }: &Candidate, weight: f64) {
+    pub fn add(&mut self, (g, e): (&DMatrix<f64>, &DVector<f64>), weight: f64) {
         self.information.gemm_tr(weight, g, g, 1.0);
         self.rhs.gemv_tr(weight, g, e, 1.0);
         self.squares += weight * e.norm_squared();
     }
 
-    fn factor(&self) -> Option<SymmetricFactor> {
+    pub fn factor(&self) -> Option<SymmetricFactor> {
         let mut n = self.information.clone();
         let held = HELD * n.diagonal().max();
         (0..n.nrows()).for_each(|k| n[(k, k)] += held);
@@ -314,14 +366,8 @@ impl Stop {
 }
 
 /// What the images of one stop say of its postures.
-fn stop(
-    adjustment: &Adjustment,
-    free: &FreePoses,
-    series: &[MeasuredSeries],
-    images: &[usize],
-    columns: &[usize],
-) -> Option<Stop> {
-    let Adjustment { problem, state } = adjustment;
+fn stop(compared: &Compared, series: &[MeasuredSeries], images: &[usize]) -> Option<Stop> {
+    let Adjustment { problem, state } = &compared.adjustment;
     let row = |&i: &usize| {
         let image = &problem.images[i];
         let row = series[image.series].stops.iter().position(|s| s.image == image.name)?;
@@ -329,25 +375,11 @@ fn stop(
     };
     let rows: Vec<(usize, usize)> = images.iter().filter_map(row).collect();
     let &(s, row) = rows.first()?;
-    let read = problem.stops[problem.images[images[0]].stop].posture.as_ref()?;
     let own = series[s].stops[row].readings.clone()?;
     let others = series[s].postures.get(row).cloned().unwrap_or_default();
     let origins = state.robot.linear_origins();
     let of = |readings: Vec<f64>| {
-        let (posture, zeros) = (approached(read, &readings), vec![0.0; readings.len()]);
-        let mut g = DMatrix::zeros(6 * images.len(), columns.len());
-        let mut e = DVector::zeros(6 * images.len());
-        for (k, &i) in images.iter().enumerate() {
-            let pose = free.poses[i].as_ref()?;
-            let from = TakenFrom::rigid(&posture, &zeros);
-            let chained = state.chained_from(&origins, &problem.layout, &problem.images[i], from)?;
-            let by_readings = chained.d_latent.columns(0, readings.len()) * JOINT_SIGMA;
-            let noise =
-                pose.covariance + Matrix6::from_column_slice((&by_readings * by_readings.transpose()).as_slice());
-            let root = noise.cholesky()?.l().try_inverse()?;
-            e.rows_mut(6 * k, 6).copy_from(&(root * (chained.pose.inverse() * pose.camera_from_plate).log()));
-            g.rows_mut(6 * k, 6).copy_from(&(root * chained.d_theta.select_columns(columns)));
-        }
+        let (g, e) = compared.seen_at((state, &origins), images, &readings)?;
         Some(Candidate { readings, g, e })
     };
     let candidates = std::iter::once(own).chain(others).map(of).collect::<Option<Vec<_>>>()?;

@@ -7,6 +7,7 @@ use nalgebra::DVector;
 
 use super::build::FIRST_JOINT_NOISE;
 use super::computed_postures::{Before, Told, told_by_images};
+use super::controller_tool::tool_in_poses;
 use super::estimator::Estimator;
 use super::joint::{JointFit, fit_model};
 use super::lens_choice::{self, Lensed, with_lenses};
@@ -14,6 +15,7 @@ use super::near_nominal::near_nominal;
 use super::options::{JointNoise, Options};
 use super::solution::{Evidence, LensEvidence, Solution};
 use super::turns;
+use crate::diagnose::ToolInPoses;
 use crate::error::{Notice, Result};
 use crate::fit::{Fit, log_evidence};
 use crate::linalg::SymmetricFactor;
@@ -78,9 +80,16 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let mut solution = Solution { evidences, lenses, ..fit.judged(&lensed, options.estimator)? };
     solution.findings.extend(notices.into_iter().map(Into::into));
     solution.findings.extend(of_postures.map(|t| t.finding(series, &told).into()));
+    solution.findings.extend(of_tool(&rigid, &told, options).map(Into::into));
     let losses = lens_choice::losses(&solution);
     solution.findings.extend(losses.into_iter().map(Into::into));
     Ok(Solution { options: options.clone(), ..solution })
+}
+
+fn of_tool(robot: &Robot, series: &[MeasuredSeries], options: &Options) -> Option<ToolInPoses> {
+    tool_in_poses(robot, series, &options.limits, |start| {
+        options.selection.apply(&mut start.problem.layout, &mut start.state, &options.limits)
+    })
 }
 
 fn told_postures(

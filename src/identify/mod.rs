@@ -12,6 +12,7 @@ mod compare;
 mod comparison;
 mod computed_postures;
 mod controller_readings;
+mod controller_tool;
 mod detections;
 mod dry_run;
 mod estimator;

@@ -18,8 +18,6 @@ use crate::urdf::JointKind;
 const STARTS: usize = 200;
 /// Joints that are stated beside a pose are nearer than this to those that reach it, rad.
 const FARTHEST_STATED_RAD: f64 = 0.5;
-/// Joints that are stated beside a pose are nearer than this to those that reach it, rad.
-const FARTHEST_STATED_RAD: f64 = 0.5;
 /// Seed of these starts.
 const SEED: u64 = 5;
 /// A solution in which no joint is further (rad or m) from where the robot comes is of the same posture.
