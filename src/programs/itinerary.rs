@@ -8,25 +8,42 @@ use super::program::{Approach, Arrival, Left, MeantPosture, Program, Target, Tar
 /// File of a target, and its first byte there.
 type Place = (usize, usize);
 
-/// Where the robot may stand.
+/// From where a stand is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Stand {
-    /// At a target.
-    At(Place),
-    /// Further than a target, in its posture.
-    Beyond(Place),
-    /// Where it stood when the routine was called.
-    AsCalled,
+enum Origin {
+    /// A target.
+    Target(Place),
+    /// Where the robot stood when the routine was called.
+    Call,
     /// The text does not tell.
     Unknown,
 }
 
+/// Whether the robot has gone on from there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Gone {
+    /// It stands there.
+    Not,
+    /// A routine that is in none of the files may have moved it.
+    Perhaps,
+    /// It stands elsewhere, in the posture of there.
+    Beyond,
+}
+
+/// Where the robot may stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Stand {
+    from: Origin,
+    gone: Gone,
+}
+
 impl Stand {
-    fn beyond(self) -> Self {
-        match self {
-            Self::At(place) => Self::Beyond(place),
-            other => other,
-        }
+    fn at(from: Origin) -> Self {
+        Self { from, gone: Gone::Not }
+    }
+
+    fn gone(self, gone: Gone) -> Self {
+        Self { gone: self.gone.max(gone), ..self }
     }
 }
 
@@ -35,19 +52,25 @@ impl Stand {
 pub(super) struct Stands(BTreeSet<Stand>);
 
 impl Stands {
-    fn at(stand: Stand) -> Self {
-        Self(BTreeSet::from([stand]))
+    fn at(from: Origin) -> Self {
+        Self(BTreeSet::from([Stand::at(from)]))
     }
 
-    fn beyond(&self) -> Self {
-        Self(self.0.iter().map(|stand| stand.beyond()).collect())
+    fn gone(&self, gone: Gone) -> Self {
+        Self(self.0.iter().map(|stand| stand.gone(gone)).collect())
+    }
+
+    /// How far a routine that ended here has moved the robot from where it was called; `None` where that is elsewhere.
+    fn gone_from_call(&self) -> Option<Gone> {
+        let all = self.0.iter().map(|stand| (stand.from == Origin::Call).then_some(stand.gone));
+        all.collect::<Option<Vec<Gone>>>()?.into_iter().max()
     }
 }
 
 /// Where a routine has not moved the robot yet.
 impl Default for Stands {
     fn default() -> Self {
-        Self::at(Stand::AsCalled)
+        Self::at(Origin::Call)
     }
 }
 
@@ -61,12 +84,12 @@ impl Followed for Stands {
     }
 
     fn behind_call(&self, end: &Self) -> Self {
-        if *end == Self::default() {
-            return self.clone();
-        }
-        let moved = end.0.iter().filter(|stand| **stand != Stand::AsCalled).map(|stand| stand.beyond());
-        let kept = end.0.contains(&Stand::AsCalled).then(|| self.beyond().0).into_iter().flatten();
-        Self(moved.chain(kept).collect())
+        let least = if end.gone_from_call().is_some() { Gone::Not } else { Gone::Beyond };
+        let behind = |stand: &Stand| match stand.from {
+            Origin::Call => self.gone(stand.gone.max(least)).0,
+            Origin::Target(_) | Origin::Unknown => BTreeSet::from([stand.gone(Gone::Beyond)]),
+        };
+        Self(end.0.iter().flat_map(behind).collect())
     }
 }
 
@@ -129,9 +152,11 @@ impl Itinerary {
     pub fn call<T: Followed>(&mut self, name: String, flow: &mut Flow<(T, Stands)>, now: &mut (T, Stands)) {
         let before = std::mem::take(&mut now.1);
         flow.call(name, now);
-        if now.1 != Stands::default() {
-            self.from = Approach::Unknown;
-        }
+        self.from = match now.1.gone_from_call() {
+            Some(Gone::Not | Gone::Perhaps) => self.from,
+            Some(Gone::Beyond) => self.from.beyond(),
+            None => Approach::Unknown,
+        };
         now.1 = before.behind_call(&now.1);
     }
 
@@ -173,7 +198,7 @@ impl Itinerary {
             self.declare(target);
         }
         self.from = Approach::From(index);
-        *now = Stands::at(Stand::At(place));
+        *now = Stands::at(Origin::Target(place));
         true
     }
 
@@ -204,26 +229,36 @@ impl Itinerary {
     /// The robot goes on beyond the target, in its posture.
     pub fn go_beyond(&mut self, now: &mut Stands) {
         self.from = self.from.beyond();
-        *now = now.beyond();
+        *now = now.gone(Gone::Beyond);
+    }
+
+    /// A routine that is in none of the files may move the robot: what the next target leaves out is not known, the posture goes on.
+    pub fn may_go(&self, now: &mut Stands) {
+        *now = now.gone(Gone::Perhaps);
     }
 
     /// The next target is approached from one of several: from none in particular.
     pub fn lose(&mut self, now: &mut Stands) {
         self.from = Approach::Unknown;
-        *now = Stands::at(Stand::Unknown);
+        *now = Stands::at(Origin::Unknown);
     }
 
     /// The program with all ways to its targets.
     pub fn finished(mut self) -> Program {
         let index = |place| self.visited.get(&place).copied();
-        let approach = |stand| match stand {
-            Stand::At(place) => index(place).map_or(Approach::Unknown, Approach::From),
-            Stand::Beyond(place) => index(place).map_or(Approach::Unknown, Approach::Beyond),
-            Stand::AsCalled | Stand::Unknown => Approach::Unknown,
+        let approach = |stand: Stand, is_partial: bool| match stand.from {
+            Origin::Target(place) => index(place).map_or(Approach::Unknown, |k| match stand.gone {
+                Gone::Beyond => Approach::Beyond(k),
+                Gone::Perhaps if is_partial => Approach::Beyond(k),
+                Gone::Perhaps | Gone::Not => Approach::From(k),
+            }),
+            Origin::Call | Origin::Unknown => Approach::Unknown,
         };
         for (target, ways) in std::mem::take(&mut self.arrivals) {
-            let arrival = |(stand, posture)| Arrival { from: approach(stand), posture };
-            self.program.targets[target].arrivals = ways.into_iter().map(arrival).collect();
+            let target = &mut self.program.targets[target];
+            let is_partial = target.kind.is_partial();
+            let arrival = |(stand, posture)| Arrival { from: approach(stand, is_partial), posture };
+            target.arrivals = ways.into_iter().map(arrival).collect();
         }
         self.program
     }

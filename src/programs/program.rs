@@ -126,6 +126,16 @@ pub enum TargetKind {
 }
 
 impl TargetKind {
+    /// True where the text leaves numbers out that the target has.
+    pub(super) fn is_partial(&self) -> bool {
+        match self {
+            Self::Joints(joints) => {
+                joints.readings.iter().zip(&joints.fields).any(|(q, field)| field.is_some() && !q.is_finite())
+            }
+            Self::Pose(pose) => pose.is_partial(),
+        }
+    }
+
     /// Where its first number stands in its file.
     pub(super) fn first_byte(&self) -> usize {
         let start = |f: &Field| match &f.place {
