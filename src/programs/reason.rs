@@ -22,6 +22,8 @@ pub enum LeftReason {
     FrameUnknown,
     /// An external axis that the description lacks is not at zero: it may carry the robot or the work.
     ExternalAxis,
+    /// On the way there the tool keeps its orientation, whatever the target says.
+    OrientationKept,
     /// It is used with different tools or frames.
     FramesDiffer,
     /// No motion of the files goes there, and so much of it is not known.
@@ -52,6 +54,7 @@ impl LeftReason {
             Self::ToolUnknown => "tool_unknown",
             Self::FrameUnknown => "frame_unknown",
             Self::ExternalAxis => "external_axis",
+            Self::OrientationKept => "orientation_kept",
             Self::FramesDiffer => "frames_differ",
             Self::Unvisited => "unvisited",
             Self::PostureUnknown => "posture_unknown",

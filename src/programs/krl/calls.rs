@@ -4,14 +4,14 @@ use std::ops::Range;
 
 use super::aggregate::index;
 use super::assigned::assigned;
-use super::motions::MOVES;
+use super::motions::{MOVES, begins_spline};
 use crate::programs::references::{Calling, Given, Parameter, Passing, References, Which, parts};
 use crate::programs::scan::{Reader, TokenKind};
 
 /// Words before a bracket that call nothing.
-const WORDS: [&str; 18] = [
+pub(super) const WORDS: [&str; 23] = [
     "IF", "ELSE", "WHILE", "UNTIL", "FOR", "TO", "STEP", "SWITCH", "CASE", "RETURN", "WAIT", "AND", "OR", "EXOR",
-    "NOT", "WHEN", "DO", "B_NOT",
+    "NOT", "WHEN", "DO", "B_NOT", "B_AND", "B_OR", "B_EXOR", "SEC", "PULSE",
 ];
 
 /// Statements that run something beside the text, when an event comes.
@@ -51,7 +51,7 @@ fn name_of(reader: &mut Reader<'_>, part: Range<usize>) -> Option<String> {
 }
 
 /// Arguments in the brackets at token `open` that are names.
-fn given(reader: &mut Reader<'_>, open: usize) -> Vec<Given> {
+pub(super) fn given(reader: &mut Reader<'_>, open: usize) -> Vec<Given> {
     let Some(close) = reader.closing(open) else { return Vec::new() };
     let all = parts(reader, open + 1..close, |mark| mark == b',').into_iter().enumerate();
     let name = |(k, part)| name_of(reader, part).map(|name| Given { which: Which::Nth(k), name });
@@ -88,7 +88,8 @@ pub(super) fn look_through(references: &mut References, mut reader: Reader<'_>) 
 /// What a line sets and calls; what motions state behind `WITH` reads only.
 fn line(references: &mut References, reader: &mut Reader<'_>) {
     let start = reader.at;
-    let is_motion = reader.name().is_some_and(|word| MOVES.iter().any(|(name, _)| *name == word) || word == "SPLINE");
+    let is_motion =
+        begins_spline(reader) || reader.name().is_some_and(|word| MOVES.iter().any(|(name, _)| *name == word));
     if let Some((name, _)) = assigned(reader) {
         references.sets(&name);
     }

@@ -1,4 +1,4 @@
-//! Tool and base of a motion: `$TOOL`, `$BASE` and `$IPO_MODE`.
+//! Tool and base of a motion, and what else statements set for it: `$TOOL`, `$BASE`, `$IPO_MODE` and `$ORI_TYPE`.
 
 use std::collections::BTreeSet;
 
@@ -36,6 +36,10 @@ pub(super) struct Active {
     pub tool: Held<FrameIs>,
     pub base: Held<FrameIs>,
     pub tool_in_room: Held<bool>,
+    /// On a path the tool keeps its orientation, or may keep it.
+    pub keeps_orientation: Held<bool>,
+    /// A sensor moves the robot on top of its targets, or may do so.
+    pub is_sensed: Held<bool>,
     /// Routines and frames that an interrupt or a trigger may run or set at any time.
     pub beside: Held<BTreeSet<String>>,
 }
@@ -48,11 +52,13 @@ impl Active {
             tool: Held::new(tool),
             base: Held::new(base),
             tool_in_room: Held::new(tool_in_room),
+            keeps_orientation: Held::new(false),
+            is_sensed: Held::new(false),
             beside: Held::new(BTreeSet::new()),
         }
     }
 
-    /// All of it.
+    /// All frames.
     pub fn set(&mut self, frames: Frames) {
         self.tool.set(frames.tool);
         self.base.set(frames.base);
@@ -67,6 +73,8 @@ impl Followed for Active {
             tool: self.tool.merged(&other.tool, unknown),
             base: self.base.merged(&other.base, unknown),
             tool_in_room: self.tool_in_room.merged(&other.tool_in_room, |_, _| true),
+            keeps_orientation: self.keeps_orientation.merged(&other.keeps_orientation, |_, _| true),
+            is_sensed: self.is_sensed.merged(&other.is_sensed, |_, _| true),
             beside: self.beside.merged(&other.beside, |one, other| one | other),
         }
     }
@@ -76,6 +84,8 @@ impl Followed for Active {
             tool: self.tool.at_top(),
             base: self.base.at_top(),
             tool_in_room: self.tool_in_room.at_top(),
+            keeps_orientation: self.keeps_orientation.at_top(),
+            is_sensed: self.is_sensed.at_top(),
             beside: self.beside.at_top(),
         }
     }
@@ -85,17 +95,20 @@ impl Followed for Active {
             tool: self.tool.behind_call(&end.tool),
             base: self.base.behind_call(&end.base),
             tool_in_room: self.tool_in_room.behind_call(&end.tool_in_room),
+            keeps_orientation: self.keeps_orientation.behind_call(&end.keeps_orientation),
+            is_sensed: self.is_sensed.behind_call(&end.is_sensed),
             beside: self.beside.behind_call(&end.beside),
         }
     }
 }
 
-/// What a motion or a spline block states for itself (`WITH $TOOL=.., $BASE=.., $IPO_MODE=..`).
+/// What a motion or a spline block states for itself (`WITH $TOOL=.., $BASE=.., $IPO_MODE=.., $ORI_TYPE=..`).
 #[derive(Debug, Clone, Default)]
 pub(super) struct OwnFrames {
     pub tool: Option<FrameIs>,
     pub base: Option<FrameIs>,
     pub tool_in_room: Option<bool>,
+    pub keeps_orientation: Option<bool>,
 }
 
 impl OwnFrames {
@@ -105,6 +118,7 @@ impl OwnFrames {
             tool: self.tool.or_else(|| other.tool.clone()),
             base: self.base.or_else(|| other.base.clone()),
             tool_in_room: self.tool_in_room.or(other.tool_in_room),
+            keeps_orientation: self.keeps_orientation.or(other.keeps_orientation),
         }
     }
 

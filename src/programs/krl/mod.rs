@@ -3,23 +3,28 @@
 mod aggregate;
 mod assigned;
 mod beside;
+mod called;
 mod calls;
+mod copies;
 mod frames;
 mod motions;
+mod orientation;
 mod reads;
 mod scopes;
 mod stated;
 mod unvisited;
 mod uses;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use aggregate::{Aggregate, index};
-use assigned::{Assigned, assigned, matching};
+use assigned::{Assigned, assigned};
+use called::Given;
 use calls::{is_beside, routine_name};
+use copies::Copies;
 use frames::{Active, FrameIs, Frames, OwnFrames};
-use motions::{MOVES, RELATIVE, posture_of};
+use motions::{MOVES, RELATIVE, begins_spline};
 use scopes::Scopes;
 use uses::Uses;
 
@@ -27,7 +32,7 @@ use super::ProgramSetting;
 use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::names::{plain_error, plain_names};
-use super::program::{Left, PoseTarget, Program, Target, TargetKind, Understood};
+use super::program::{Left, PoseTarget, Program, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use super::references::References;
 use super::scan::{Dialect, Reader, TokenKind};
@@ -49,6 +54,8 @@ enum Value {
     Aggregate(Aggregate),
     /// Another name.
     Name(String),
+    /// What another name held when a statement copied it, and the name with which its numbers stand in the text.
+    Copied(Understood<(Aggregate, String)>),
     Expression,
 }
 
@@ -91,7 +98,11 @@ fn reading(
         now: unset(),
         flow: Flow::new(known),
         motion_data: None,
+        path_data: None,
         spline: None,
+        routines: BTreeSet::new(),
+        copies: Copies::default(),
+        given: Vec::new(),
         way: Itinerary::new(),
     };
     let mut references = References::default();
@@ -103,6 +114,7 @@ fn reading(
         }
     }
     module.assigned.changed_by_calls(&references);
+    module.routines = references.routines().map(str::to_owned).collect();
     // Data first: programs use them in whatever order the files are given.
     for wanted in [false, true] {
         for (index, file) in files.iter().enumerate().filter(|(_, f)| has_moves(f) == wanted) {
@@ -110,6 +122,7 @@ fn reading(
         }
     }
     module.unvisited();
+    module.given_away(|file| has_moves(&files[file]));
     Ok((module.way.finished(), module.flow.found()))
 }
 
@@ -136,17 +149,25 @@ struct Module<'a> {
     now: Now,
     /// How they change.
     flow: Flow<Now>,
-    /// Motion data (`FDAT_ACT`) that `BAS` has not taken yet.
-    motion_data: Option<Frames>,
+    /// Motion data (`FDAT_ACT`) that `BAS` has not taken yet, as far as the files have them.
+    motion_data: Option<Option<Aggregate>>,
+    /// What the data of a path (`LDAT_ACT`) say of orientations: true where the tool keeps its own, `None` where they say nothing.
+    path_data: Option<bool>,
     /// Frames of the spline block that is open.
     spline: Option<OwnFrames>,
+    /// Routines in the files.
+    routines: BTreeSet<String>,
+    /// Copies of names that had no value yet.
+    copies: Copies,
+    /// Variables that routines in none of the files are given.
+    given: Vec<Given>,
     way: Itinerary,
 }
 
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
         self.start_afresh();
-        (self.now, self.motion_data, self.spline) = (unset(), None, None);
+        (self.now, self.motion_data, self.path_data, self.spline) = (unset(), None, None, None);
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -154,10 +175,9 @@ impl Module<'_> {
                 continue;
             };
             if moves {
-                self.calls(&reader);
+                self.calls(&mut reader);
             }
-            let spline = word == "SPLINE" || (word == "PTP" && reader.ahead_is_word(1, "SPLINE"));
-            if moves && spline {
+            if moves && begins_spline(&reader) {
                 // Frames of a spline block hold for all of it.
                 self.spline = Some(self.with(&mut reader));
             } else if moves && reader.ahead_is_mark(1, b':') {
@@ -175,7 +195,7 @@ impl Module<'_> {
                 self.bas(&mut reader);
             } else {
                 self.waits(&word);
-                self.assignment(&mut reader, system || moves)?;
+                self.assignment(&mut reader, moves, system || moves)?;
             }
             reader.skip_line();
         }
@@ -183,12 +203,18 @@ impl Module<'_> {
     }
 
     /// `[DECL] [GLOBAL] [TYPE] NAME[n] = value`.
-    fn assignment(&mut self, reader: &mut Reader<'_>, no_targets: bool) -> Result<()> {
+    fn assignment(&mut self, reader: &mut Reader<'_>, moves: bool, no_targets: bool) -> Result<()> {
         let (file, line) = (reader.index, reader.line());
         let Some((name, component)) = assigned(reader) else { return Ok(()) };
         if name == "$IPO_MODE" {
             let is_in_room = self.is_tool_in_room(reader);
             self.now.0.tool_in_room.set(is_in_room);
+            return Ok(());
+        }
+        if name == "$ORI_TYPE" {
+            if let Some(keeps) = self.keeps_orientation(reader) {
+                self.now.0.keeps_orientation.set(keeps);
+            }
             return Ok(());
         }
         let value = match component {
@@ -200,6 +226,7 @@ impl Module<'_> {
             "$BASE" => self.now.0.base.set(self.frame(&value)),
             "$ROBROOT" => self.root = self.frame(&value),
             "FDAT_ACT" => self.use_data(&value),
+            "LDAT_ACT" => self.path_data = self.keeps_by_data(&value),
             _ => {
                 if !no_targets
                     && let Value::Aggregate(a) = &value
@@ -208,6 +235,7 @@ impl Module<'_> {
                     self.declared.push((name.clone(), file, line));
                 }
                 self.refuse_twins(&name, &value, reader)?;
+                let value = if moves { self.copied(&name, value) } else { value };
                 self.values.insert(name, value);
             }
         }
@@ -248,6 +276,8 @@ impl Module<'_> {
             match value {
                 Value::Aggregate(a) if a.is_computed() && !a.has(&["IPO_FRAME"]) => break,
                 Value::Aggregate(a) => return Ok((a, name)),
+                Value::Copied(Ok((a, origin))) => return Ok((a, Some(origin))),
+                Value::Copied(Err(why)) => return Err(why.clone()),
                 Value::Name(n) if self.assigned.changes(n) => {
                     let words =
                         format!("{n} gets another value in the program: which of them holds, the text does not tell");
@@ -267,68 +297,13 @@ impl Module<'_> {
         Err(Why::computed())
     }
 
-    /// A motion; the reader stands on its name.
-    fn motion(&mut self, reader: &mut Reader<'_>, name: &str, count: usize) -> Result<()> {
-        let line = reader.line();
-        reader.at += 1;
-        let at = reader.at;
-        let own = self.with(reader);
-        reader.at = at;
-        let frames = own.or(self.spline.as_ref()).over(&self.now.0);
-        for k in 0..count {
-            if k > 0 && !reader.take_mark(b',') {
-                let what = format!("{name} has {k} targets, not {count}");
-                return Err(Error::new(
-                    Code::ProgramTargets,
-                    format!("{}:{line}", reader.file.name),
-                    what,
-                    "complete the motion",
-                ));
-            }
-            if reader.at_line_end() {
-                let what = format!("{name} has no target");
-                return Err(Error::new(
-                    Code::ProgramTargets,
-                    format!("{}:{line}", reader.file.name),
-                    what,
-                    "complete the motion",
-                ));
-            }
-            let value = self.value(reader)?;
-            // To where the robot stands already.
-            if matches!(&value, Value::Name(n) if n.starts_with('$')) {
-                continue;
-            }
-            let elements = self.elements(value);
-            // Which element of several the robot goes to, the text does not tell.
-            let several = elements.len() > 1;
-            for value in elements {
-                if several {
-                    self.way.lose(&mut self.now.1);
-                }
-                if let Err(why) = self.visit(&value, name, (reader.index, line), &frames) {
-                    let points = self.points_in(&value, reader.index, line);
-                    self.leave_at(reader.index, line, name, why.starting_from(points));
-                }
-                if several {
-                    self.way.lose(&mut self.now.1);
-                }
-            }
-        }
-        if reader.rest_of_line_has("CA") {
-            // The circle goes on, or ends before the point.
-            self.way.go_beyond(&mut self.now.1);
-        }
-        self.time_passes();
-        Ok(())
-    }
-
     /// Statements that decide from where the robot comes; false for any other word.
     fn flow(&mut self, reader: &Reader<'_>, word: &str) -> bool {
         match word {
             "DEF" | "DEFFCT" | "GLOBAL" => {
                 let Some(name) = routine_name(reader) else { return false };
                 self.start_afresh();
+                self.copies = Copies::default();
                 self.flow.routine_begins(name, &mut self.now, &unset());
             }
             "RETURN" => self.flow.returns(&self.now),
@@ -371,31 +346,6 @@ impl Module<'_> {
         self.way.lose(&mut self.now.1);
     }
 
-    /// Routines that a line calls, which may set frames; the reader stands at its beginning.
-    fn calls(&mut self, reader: &Reader<'_>) {
-        // What BAS sets stands in its arguments.
-        if routine_name(reader).is_some() || matches!(reader.name().as_deref(), Some("BAS" | "EXT" | "EXTFCT")) {
-            return;
-        }
-        let line = (0..).map_while(|k| Some((k, reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd)?)));
-        for (k, token) in line.filter(|(_, token)| token.kind == TokenKind::Word) {
-            let name = String::from_utf8_lossy(reader.text(token)).to_ascii_uppercase();
-            let is_given = [b'(', b','].iter().any(|mark| reader.ahead_is_mark(k - 1, *mark));
-            if reader.ahead_is_mark(k + 1, b'(') && is_beside(reader) {
-                self.begins_beside(name);
-            } else if reader.ahead_is_mark(k + 1, b'(') {
-                self.way.call(name, &mut self.flow, &mut self.now);
-            } else if is_given && self.assigned.changes(&name) {
-                let unknown = FrameIs::Unknown("a routine that it is given to may change it".into());
-                match name.as_str() {
-                    "$TOOL" => self.now.0.tool.set(unknown),
-                    "$BASE" => self.now.0.base.set(unknown),
-                    _ => {}
-                }
-            }
-        }
-    }
-
     fn start_afresh(&mut self) {
         self.way.start_afresh();
         self.flow.all_end(&mut self.now);
@@ -405,39 +355,6 @@ impl Module<'_> {
         // Status and turn may mean another posture, but on a path of the tool it goes on.
         let same_posture = !name.starts_with("PTP") && !name.starts_with("SPTP");
         self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture, &mut self.now.1);
-    }
-
-    /// `P[I]` stands for all elements of `P` that the text has, in the order of their numbers; anything else for itself.
-    fn elements(&mut self, value: Value) -> Vec<Value> {
-        let Value::Name(name) = &value else { return vec![value] };
-        if self.values.contains_key(name) || !name.ends_with(']') {
-            return vec![value];
-        }
-        let mut all: Vec<(Vec<i64>, Value)> =
-            self.values.keys().filter_map(|n| Some((matching(n, name)?, Value::Name(n.clone())))).collect();
-        if all.is_empty() {
-            return vec![value];
-        }
-        all.sort_by(|a, b| a.0.cmp(&b.0));
-        all.into_iter().map(|(_, v)| v).collect()
-    }
-
-    fn visit(&mut self, value: &Value, motion: &str, from: (usize, usize), frames: &Frames) -> Understood<()> {
-        let (aggregate, name) = self.resolved(value)?;
-        if let Some(frame) = name.filter(|name| self.uses.is_frame(name)) {
-            let words = format!("{frame} is $BASE or $TOOL as well, of other targets; give it a position of its own");
-            return Err(Why::of(frame, LeftReason::FramesDiffer, words));
-        }
-        let named = name.unwrap_or(motion).to_owned();
-        let about = |why: Why| Why { about: name.map(str::to_owned).or(why.about.clone()), ..why };
-        let mut kind = self.kind(aggregate, frames).map_err(about)?;
-        if let TargetKind::Pose(pose) = &mut kind {
-            pose.posture = posture_of(motion, pose.posture.clone());
-        }
-        let place = if name.is_some() { (aggregate.file, aggregate.line) } else { from };
-        let clash = format!("{named} is used with different $TOOL or $BASE; give it a position for each");
-        let visited = self.way.visit(Target::at(place, named, kind), &mut self.now.1);
-        if visited { Ok(()) } else { Err(Why::new(LeftReason::FramesDiffer, clash)) }
     }
 
     fn kind(&self, a: &Aggregate, frames: &Frames) -> Understood<TargetKind> {

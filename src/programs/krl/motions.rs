@@ -1,17 +1,188 @@
 //! Motions of KRL.
 
-use crate::programs::program::MeantPosture;
+use super::aggregate::Aggregate;
+use super::assigned::matching;
+use super::frames::Frames;
+use super::{Module, POSE_NAMES, Value};
+use crate::error::{Code, Error, Result};
+use crate::programs::program::{MeantPosture, Target, TargetKind, Understood};
+use crate::programs::reason::{LeftReason, Why};
+use crate::programs::scan::Reader;
 
 /// Motions and how many targets they have.
 pub(super) const MOVES: [(&str, usize); 7] =
     [("PTP", 1), ("LIN", 1), ("CIRC", 2), ("SPTP", 1), ("SLIN", 1), ("SCIRC", 2), ("SPL", 1)];
-pub(super) const RELATIVE: [&str; 6] = ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL"];
+pub(super) const RELATIVE: [&str; 7] =
+    ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL", "SPL_REL"];
+/// Motions of the joints; the others lead the tool along a path.
+const OF_JOINTS: [&str; 2] = ["PTP", "SPTP"];
+/// Variables of the controller that say where the robot stands.
+const STANDS: [&str; 2] = ["$AXIS_ACT", "$POS_ACT"];
+/// Components of a pose; status and turn are those behind them.
+const COMPONENTS: usize = 6;
+
+/// True for the header of a spline block: `SPLINE`, `PTP_SPLINE`, `PTP SPLINE`.
+pub(super) fn begins_spline(reader: &Reader<'_>) -> bool {
+    let is = |word| reader.ahead_is_word(0, word);
+    is("SPLINE") || is("PTP_SPLINE") || (is("PTP") && reader.ahead_is_word(1, "SPLINE"))
+}
 
 /// The posture that a motion means: on paths of the tool, status and turn are not heeded.
-pub(super) fn posture_of(motion: &str, stated: MeantPosture) -> MeantPosture {
+fn posture_of(motion: &str, stated: MeantPosture) -> MeantPosture {
     match stated {
         MeantPosture::Nearest if ["LIN", "SLIN"].contains(&motion) => MeantPosture::Along,
-        MeantPosture::Coded(codes, axes) if !["PTP", "SPTP"].contains(&motion) => MeantPosture::Unheeded(codes, axes),
+        MeantPosture::Coded(codes, axes) if !OF_JOINTS.contains(&motion) => MeantPosture::Unheeded(codes, axes),
         stated => stated,
+    }
+}
+
+/// The first component that the end of a circle leaves out and its auxiliary point has.
+fn missing_at_end(auxiliary: &Aggregate, end: &Aggregate) -> Option<&'static str> {
+    POSE_NAMES.into_iter().take(COMPONENTS).find(|name| auxiliary.has(&[name]) && !end.has(&[name]))
+}
+
+/// A motion that is being read.
+struct Motion<'m> {
+    name: &'m str,
+    /// File and line.
+    place: (usize, usize),
+    frames: Frames,
+    /// True where the tool keeps its orientation, or may keep it.
+    keeps_orientation: bool,
+}
+
+impl Motion<'_> {
+    fn needs_target<T>(&self, reader: &Reader<'_>, what: String) -> Result<T> {
+        let place = format!("{}:{}", reader.file.name, self.place.1);
+        Err(Error::new(Code::ProgramTargets, place, what, "complete the motion"))
+    }
+}
+
+impl Module<'_> {
+    /// A motion; the reader stands on its name.
+    pub(super) fn motion(&mut self, reader: &mut Reader<'_>, name: &str, count: usize) -> Result<()> {
+        let place = (reader.index, reader.line());
+        reader.at += 1;
+        let at = reader.at;
+        let own = self.with(reader).or(self.spline.as_ref());
+        reader.at = at;
+        let keeps_orientation = own.keeps_orientation.unwrap_or(self.now.0.keeps_orientation.value);
+        let motion = Motion { name, place, frames: own.over(&self.now.0), keeps_orientation };
+        let mut auxiliary = None;
+        for k in 0..count {
+            if k > 0 && !reader.take_mark(b',') {
+                return motion.needs_target(reader, format!("{name} has {k} targets, not {count}"));
+            }
+            if reader.at_line_end() {
+                return motion.needs_target(reader, format!("{name} has no target"));
+            }
+            let value = self.value(reader)?;
+            self.goes_to(&value, &motion, auxiliary.as_ref());
+            auxiliary = Some(value);
+        }
+        if reader.rest_of_line_has("CA") {
+            // The circle goes on, or ends before the point.
+            self.way.go_beyond(&mut self.now.1);
+        }
+        self.time_passes();
+        Ok(())
+    }
+
+    fn goes_to(&mut self, value: &Value, motion: &Motion<'_>, auxiliary: Option<&Value>) {
+        if let Value::Name(name) = value
+            && name.starts_with('$')
+        {
+            self.goes_to_variable(name, motion);
+            return;
+        }
+        let elements = self.elements(value);
+        // Which element of several the robot goes to, the text does not tell.
+        let several = elements.len() > 1;
+        for value in elements {
+            if several {
+                self.way.lose(&mut self.now.1);
+            }
+            let done = self.is_told(&value, auxiliary).and_then(|()| self.visit(&value, motion));
+            if let Err(why) = done {
+                let points = self.points_in(&value, motion.place.0, motion.place.1);
+                self.leave_at(motion.place.0, motion.place.1, motion.name, why.starting_from(points));
+            }
+            if several {
+                self.way.lose(&mut self.now.1);
+            }
+        }
+    }
+
+    /// A motion to a variable of the controller: to where the robot stands, or to somewhere that the text does not tell.
+    fn goes_to_variable(&mut self, name: &str, motion: &Motion<'_>) {
+        if STANDS.iter().any(|stands| name.starts_with(stands)) {
+            return;
+        }
+        let words = format!("{name} is a variable of the controller: what it holds, the text does not tell");
+        self.leave_at(motion.place.0, motion.place.1, motion.name, Why::of(name, LeftReason::Undeclared, words));
+        self.way.lose(&mut self.now.1);
+    }
+
+    /// `P[I]` stands for all elements of `P` that the text has, in the order of their numbers; anything else for itself.
+    fn elements(&self, value: &Value) -> Vec<Value> {
+        let itself = || vec![value.clone()];
+        let Value::Name(name) = value else { return itself() };
+        if self.values.contains_key(name) || !name.ends_with(']') {
+            return itself();
+        }
+        let mut all: Vec<(Vec<i64>, Value)> =
+            self.values.keys().filter_map(|n| Some((matching(n, name)?, Value::Name(n.clone())))).collect();
+        if all.is_empty() {
+            return itself();
+        }
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all.into_iter().map(|(_, v)| v).collect()
+    }
+
+    /// What the end of a circle leaves out is that of the position before it: the text does not tell whether the auxiliary point is one.
+    fn is_told(&self, value: &Value, auxiliary: Option<&Value>) -> Understood<()> {
+        let Some(auxiliary) = auxiliary else { return Ok(()) };
+        let (Ok((end, name)), Ok((auxiliary, _))) = (self.resolved(value), self.resolved(auxiliary)) else {
+            return Ok(());
+        };
+        let Some(missing) = missing_at_end(auxiliary, end) else { return Ok(()) };
+        let words = format!(
+            "it leaves out {missing}, which its auxiliary point has: whether that or the start of the circle counts, is not known"
+        );
+        let why = Why::new(LeftReason::Incomplete, words);
+        Err(Why { about: name.map(str::to_owned), ..why })
+    }
+
+    fn visit(&mut self, value: &Value, motion: &Motion<'_>) -> Understood<()> {
+        let (aggregate, name) = self.resolved(value)?;
+        if let Some(frame) = name.filter(|name| self.uses.is_frame(name)) {
+            let words = format!("{frame} is $BASE or $TOOL as well, of other targets; give it a position of its own");
+            return Err(Why::of(frame, LeftReason::FramesDiffer, words));
+        }
+        let named = name.unwrap_or(motion.name).to_owned();
+        let about = |why: Why| Why { about: name.map(str::to_owned).or(why.about.clone()), ..why };
+        let mut kind = self.kind(aggregate, &motion.frames).map_err(about)?;
+        self.goes_as_told(&kind, motion).map_err(about)?;
+        if let TargetKind::Pose(pose) = &mut kind {
+            pose.posture = posture_of(motion.name, pose.posture.clone());
+        }
+        let place = if name.is_some() { (aggregate.file, aggregate.line) } else { motion.place };
+        let clash = format!("{named} is used with different $TOOL or $BASE; give it a position for each");
+        let visited = self.way.visit(Target::at(place, named, kind), &mut self.now.1);
+        if visited { Ok(()) } else { Err(Why::new(LeftReason::FramesDiffer, clash)) }
+    }
+
+    /// Refuses targets where the robot does not go to all that they say, or by more.
+    fn goes_as_told(&self, kind: &TargetKind, motion: &Motion<'_>) -> Understood<()> {
+        if self.now.0.is_sensed.value {
+            let words = "a sensor may move the robot on top of it (RSI_ON)";
+            return Err(Why::new(LeftReason::FrameUnknown, words));
+        }
+        let is_path = matches!(kind, TargetKind::Pose(_)) && !OF_JOINTS.contains(&motion.name);
+        if is_path && motion.keeps_orientation {
+            let words = "the tool keeps its orientation, or may keep it, whatever A, B, C say ($ORI_TYPE)";
+            return Err(Why::new(LeftReason::OrientationKept, words));
+        }
+        Ok(())
     }
 }

@@ -56,17 +56,38 @@ impl Module<'_> {
     }
 
     pub(super) fn use_data(&mut self, value: &Value) {
-        let data = self.resolved(value).ok().and_then(|(data, _)| self.data_frames(data));
-        let unknown = || FrameIs::Unknown("its motion data are in none of the files (give the .dat as well)".into());
-        let data = data.unwrap_or_else(|| Frames { tool: unknown(), base: unknown(), ..Frames::default() });
+        let taken = self.resolved(value).ok().map(|(data, _)| data.clone());
+        let data = self.frames_of(taken.as_ref());
         // Frames that are in force stay so until `BAS(#FRAMES)`, or what sets the rest of a motion, takes the data.
         let stays = |is: &FrameIs, new: &FrameIs| matches!(is, FrameIs::Known(_)) && is != new;
         let active = &self.now.0;
         let waits = stays(&active.tool.value, &data.tool) || stays(&active.base.value, &data.base);
         let untaken = || FrameIs::Unknown("no BAS(#FRAMES) takes the motion data before it".into());
         let now = Frames { tool: untaken(), base: untaken(), ..data.clone() };
-        self.now.0.set(if waits { now } else { data.clone() });
-        self.motion_data = Some(data);
+        self.now.0.set(if waits { now } else { data });
+        self.motion_data = Some(taken);
+    }
+
+    /// Tool and base of motion data by what the frames of these numbers hold here.
+    fn frames_of(&self, data: Option<&Aggregate>) -> Frames {
+        let unknown = || FrameIs::Unknown("its motion data are in none of the files (give the .dat as well)".into());
+        let frames = data.and_then(|data| self.data_frames(data));
+        frames.unwrap_or_else(|| Frames { tool: unknown(), base: unknown(), ..Frames::default() })
+    }
+
+    /// `BAS(#FRAMES)` and what does the same takes the motion data.
+    fn take_data(&mut self) {
+        if let Some(data) = self.motion_data.take() {
+            let frames = self.frames_of(data.as_ref());
+            self.now.0.set(frames);
+        }
+    }
+
+    /// `BAS(#CP_PARAMS,..)` and `BAS(#CP_DAT)` take the data of a path.
+    fn take_path_data(&mut self) {
+        if let Some(keeps) = self.path_data {
+            self.now.0.keeps_orientation.set(keeps);
+        }
     }
 
     /// `WITH .., $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO), ..` in the rest of a line.
@@ -90,6 +111,10 @@ impl Module<'_> {
                 Some("$IPO_MODE") => {
                     reader.at += 1;
                     frames.tool_in_room = Some(self.is_tool_in_room(reader));
+                }
+                Some("$ORI_TYPE") => {
+                    reader.at += 1;
+                    frames.keeps_orientation = self.keeps_orientation(reader);
                 }
                 _ => {}
             }
@@ -150,8 +175,12 @@ impl Module<'_> {
         match what.as_deref() {
             Some("TOOL") => self.now.0.tool.set(frame("TOOL_DATA")),
             Some("BASE") => self.now.0.base.set(frame("BASE_DATA")),
+            Some("CP_DAT") => self.take_path_data(),
             Some(taken) if taken == "FRAMES" || taken.ends_with("PARAMS") => {
-                self.motion_data.take().into_iter().for_each(|data| self.now.0.set(data));
+                self.take_data();
+                if taken.starts_with("CP") {
+                    self.take_path_data();
+                }
             }
             Some("INITMOV") => {
                 let (tool, base) = (self.numbered("TOOL_DATA", 1), FrameIs::Known(Pose::identity()));

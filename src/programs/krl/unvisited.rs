@@ -43,7 +43,9 @@ impl Module<'_> {
     pub(super) fn points_in(&self, value: &Value, file: usize, line: usize) -> Vec<DeclaredPoint> {
         let names = self.uses.in_motion(file, line).filter(|_| matches!(value, Value::Expression));
         let point = |name: &String| match self.values.get(name)? {
-            Value::Aggregate(a) => Some(DeclaredPoint { name: name.clone(), file: a.file, line: a.line }),
+            Value::Aggregate(a) | Value::Copied(Ok((a, _))) => {
+                Some(DeclaredPoint { name: name.clone(), file: a.file, line: a.line })
+            }
             _ => None,
         };
         names.filter_map(point).collect()

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::aggregate::index;
 use super::assigned::assigned;
-use super::motions::MOVES;
+use super::motions::{MOVES, begins_spline};
 use crate::programs::scan::{Reader, TokenKind};
 
 /// Variables of the controller that hold frames.
@@ -17,6 +17,8 @@ pub(super) struct Uses {
     by: BTreeMap<String, String>,
     /// Those that are frames as they are.
     frames: BTreeSet<String>,
+    /// Names with those that are set to them as they are.
+    copies: BTreeMap<String, BTreeSet<String>>,
     /// Those in the targets of motions that are computed: by file and line.
     motions: BTreeMap<(usize, usize), Vec<String>>,
 }
@@ -49,7 +51,9 @@ impl Uses {
     pub fn look_through(&mut self, mut reader: Reader<'_>) {
         while !reader.done() {
             let word = reader.name().unwrap_or_default();
-            if MOVES.iter().any(|(name, _)| *name == word) {
+            if begins_spline(&reader) {
+                self.behind_with(&mut reader);
+            } else if MOVES.iter().any(|(name, _)| *name == word) {
                 self.motion(&mut reader, &word);
             } else if let Some((set, _)) = assigned(&mut reader) {
                 self.assignment(&mut reader, &set);
@@ -60,8 +64,10 @@ impl Uses {
 
     fn assignment(&mut self, reader: &mut Reader<'_>, set: &str) {
         let used = names(reader, |_| false);
-        if let ([name], true) = (&used[..], FRAMES.contains(&set)) {
-            self.frames.insert(name.clone());
+        match &used[..] {
+            [name] if FRAMES.contains(&set) => _ = self.frames.insert(name.clone()),
+            [name] => _ = self.copies.entry(name.clone()).or_default().insert(set.to_owned()),
+            _ => {}
         }
         used.into_iter().for_each(|name| _ = self.by.insert(name, set.to_owned()));
     }
@@ -76,6 +82,11 @@ impl Uses {
             used.iter().for_each(|name| _ = self.by.insert(name.clone(), motion.to_owned()));
             self.motions.insert(place, used);
         }
+        self.behind_with(reader);
+    }
+
+    /// Frames in the rest of a line.
+    fn behind_with(&mut self, reader: &mut Reader<'_>) {
         while !reader.at_line_end() {
             let set = reader.name().filter(|name| FRAMES.contains(&name.as_str()) && reader.ahead_is_mark(1, b'='));
             reader.at += 1;
@@ -96,9 +107,18 @@ impl Uses {
         self.by.get(name)
     }
 
-    /// True for a name that is `$BASE` or `$TOOL` at some place.
+    /// True for a name that is `$BASE` or `$TOOL` at some place, itself or by a copy.
     pub fn is_frame(&self, name: &str) -> bool {
-        self.frames.contains(name)
+        let (mut all, mut seen) = (vec![name], BTreeSet::new());
+        while let Some(name) = all.pop() {
+            if self.frames.contains(name) {
+                return true;
+            }
+            if seen.insert(name) {
+                all.extend(self.copies.get(name).into_iter().flatten().map(String::as_str));
+            }
+        }
+        false
     }
 
     /// Names in the target of a motion that is computed.
