@@ -32,7 +32,7 @@ fn krl(cell: &Cell, body: &str) -> String {
 }
 
 /// Targets that were corrected beside the first, and the reasons of those that were left.
-fn told(cell: &Cell, files: &[(&str, String)], flags: &[&str]) -> (usize, Vec<String>) {
+pub(super) fn told(cell: &Cell, files: &[(&str, String)], flags: &[&str]) -> (usize, Vec<String>) {
     let paths: Vec<_> = files.iter().map(|(name, text)| cell.write(name, text.as_bytes())).collect();
     let run = cell.compensate(&paths.iter().collect::<Vec<_>>(), &[&["--unordered"], flags].concat());
     let told = run.told();

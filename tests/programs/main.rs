@@ -13,6 +13,7 @@ mod frames_study;
 mod given;
 mod interrupts;
 mod krl;
+mod krl_statements;
 mod loops;
 mod not_told;
 mod plan_choice;
