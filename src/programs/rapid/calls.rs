@@ -136,7 +136,7 @@ fn parameters(reader: &Reader<'_>, open: usize) -> Vec<Parameter> {
 }
 
 /// True where `:=` stands behind the name, its index and its components on which the reader stands.
-fn is_set(reader: &mut Reader<'_>) -> bool {
+pub(super) fn is_set(reader: &mut Reader<'_>) -> bool {
     let start = reader.at;
     let is_switch = reader.ahead_is_mark(-1, b'\\');
     reader.at += 1;

@@ -31,6 +31,7 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
+use calls::is_set;
 use moves::{is_of_joints, is_to_joints};
 use scopes::Scopes;
 use switched::Watched;
@@ -93,6 +94,9 @@ fn reading(
     let mut references = References::default();
     for file in files.iter().enumerate() {
         task.declarations(reader(file)?)?;
+    }
+    for file in files.iter().enumerate() {
+        task.assignments(reader(file)?);
         Task::look_for_calls(&mut references, reader(file)?);
         task.switching.look_through(reader(file)?);
     }
@@ -123,7 +127,7 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// All data of a file, and assignments to them.
+    /// All data of a file.
     fn declarations(&mut self, mut reader: Reader<'_>) -> Result<()> {
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -133,18 +137,26 @@ impl Task<'_> {
             reader.at += 1;
             if TYPES.contains(&word.as_str()) && reader.word().is_some() {
                 self.declaration(&mut reader, word)?;
-            } else if self.data.contains_key(&word) {
-                let is_value = reader.ahead_is_mark(-2, b'\\');
-                element(&mut reader, String::new());
-                let assigned = reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');
-                let component = reader.is_mark(b'.');
-                if (assigned && !is_value) || component {
-                    self.is_assigned(&word);
-                }
             }
         }
         Ok(())
     }
+    /// Assignments of a file to data of any.
+    fn assignments(&mut self, mut reader: Reader<'_>) {
+        while !reader.done() {
+            let Some(word) = reader.name() else {
+                reader.at += 1;
+                continue;
+            };
+            let is_type = TYPES.contains(&word.as_str()) && reader.name_of(reader.at + 1).is_some();
+            if self.data.contains_key(&word) && is_set(&mut reader) {
+                self.is_assigned(&word);
+            }
+            // A declaration assigns nothing.
+            reader.at += if is_type { 2 } else { 1 };
+        }
+    }
+
 
     /// `TYPE name := value;` behind its type.
     fn declaration(&mut self, reader: &mut Reader<'_>, kind: String) -> Result<()> {
