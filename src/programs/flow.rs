@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use super::routines::Routines;
 use crate::error::Result;
 
 /// Readings after which what differs from one to the next is not known: routines that call each other may never agree.
@@ -159,6 +160,10 @@ pub(super) struct Flow<T> {
     routines: Vec<Routine<T>>,
     /// False behind a statement that goes elsewhere.
     is_reached: bool,
+    /// Routines of all files.
+    named: Routines,
+    /// The file that is being read.
+    file: usize,
 }
 
 /// A statement with branches, or a loop.
@@ -202,7 +207,35 @@ fn merged<T: Followed>(all: &[T]) -> Option<T> {
 impl<T: Followed> Flow<T> {
     /// With what the reading before found.
     pub fn new(known: Places<T>) -> Self {
-        Self { known, found: Places::default(), open: Vec::new(), routines: Vec::new(), is_reached: true }
+        Self {
+            known,
+            found: Places::default(),
+            open: Vec::new(),
+            routines: Vec::new(),
+            is_reached: true,
+            named: Routines::default(),
+            file: 0,
+        }
+    }
+
+    /// The same where the files have these routines.
+    pub fn among(self, named: &Routines) -> Self {
+        Self { named: named.clone(), ..self }
+    }
+
+    /// A file begins, whose own routines its calls mean.
+    pub fn file_begins(&mut self, file: usize) {
+        self.file = file;
+    }
+
+    /// True for a name that means a routine of the files here.
+    pub fn has_routine(&self, name: &str) -> bool {
+        self.named.is_seen(name, self.file)
+    }
+
+    /// Names of their own of the routines that a call may mean here; in every file they stand for the same.
+    pub fn meant(&self, name: &str) -> Vec<String> {
+        self.named.meant(name, self.file)
     }
 
     /// What this reading found.
@@ -289,6 +322,7 @@ impl<T: Followed> Flow<T> {
 
     /// A routine begins, inside another one where that is still open; `uncalled` holds at its top where nothing calls it.
     pub fn routine_begins(&mut self, name: String, now: &mut T, uncalled: &T) {
+        let name = self.meant(&name).pop().unwrap_or(name);
         let top = self.known.calls.get(&name).unwrap_or(uncalled).at_top();
         let around = std::mem::replace(now, top);
         let is_reached = std::mem::replace(&mut self.is_reached, true);
@@ -319,7 +353,10 @@ impl<T: Followed> Flow<T> {
         self.is_reached = is_reached;
         self.open.truncate(open);
         *now = around;
-        self.found.ends.extend(end.map(|end| (name, end)));
+        if let Some(end) = end {
+            let ends = self.found.ends.entry(name);
+            ends.and_modify(|all| *all = all.merged(&end, CALLS)).or_insert(end);
+        }
     }
 
     /// All routines that are still open end.
@@ -335,18 +372,22 @@ impl<T: Followed> Flow<T> {
     pub fn call(&mut self, name: String, now: &mut T) {
         let behind = self.behind(&name, now);
         let before = std::mem::replace(now, behind.unwrap_or_else(|| now.clone()));
-        self.begins_beside(name, before);
+        self.begins_beside(&name, &before);
     }
 
     /// A routine is begun beside the text, with `top` at its top.
-    pub fn begins_beside(&mut self, name: String, top: T) {
-        let calls = self.found.calls.entry(name);
-        calls.and_modify(|all| *all = all.merged(&top, CALLS)).or_insert(top);
+    pub fn begins_beside(&mut self, name: &str, top: &T) {
+        for name in self.meant(name) {
+            let calls = self.found.calls.entry(name);
+            calls.and_modify(|all| *all = all.merged(top, CALLS)).or_insert_with(|| top.clone());
+        }
     }
 
     /// What a caller of a routine would have behind it; `None` where its end is not known.
     pub fn behind(&self, name: &str, now: &T) -> Option<T> {
-        self.known.ends.get(name).map(|end| now.behind_call(end))
+        let meant = self.meant(name);
+        let ends = meant.iter().filter_map(|name| self.known.ends.get(name));
+        merged(&ends.map(|end| now.behind_call(end)).collect::<Vec<_>>())
     }
 }
 

@@ -11,6 +11,7 @@
 //! | [`mod@compensate`] | targets of one robot to targets of another |
 //! | `flow` | what statements set, followed through branches, loops and calls |
 //! | `references` | what routines change that is given them by reference |
+//! | `routines` | which routine a call means where several files have one of its name |
 //! | `names` | names that stand for something else in one module than in another |
 //! | `scan` | tokens that all languages share |
 //! | `language` | the table of languages |
@@ -34,6 +35,7 @@ pub mod program;
 mod rapid;
 mod reason;
 mod references;
+mod routines;
 mod scan;
 mod setting;
 mod table;

@@ -138,11 +138,6 @@ impl References {
         }
     }
 
-    /// Names of all routines.
-    pub fn routines(&self) -> impl Iterator<Item = &str> {
-        self.routines.iter().map(|routine| routine.name.as_str())
-    }
-
     /// Parameters of all routines.
     pub fn parameters(&self) -> impl Iterator<Item = &Parameter> {
         self.routines.iter().flat_map(|routine| &routine.parameters)

@@ -31,9 +31,10 @@ impl Module<'_> {
         let unknown = || FrameIs::Unknown(RUN_AT_ANY_TIME.into());
         let (mut active, stands) = self.now.clone();
         active.set(Frames { tool: unknown(), base: unknown(), tool_in_room: active.tool_in_room.value });
-        active.beside.value.remove(&name);
-        self.flow.begins_beside(name.clone(), (active, stands));
-        self.goes_on_beside(name);
+        let meant = self.flow.meant(&name);
+        meant.iter().for_each(|name| _ = active.beside.value.remove(name));
+        self.flow.begins_beside(&name, &(active, stands));
+        meant.into_iter().for_each(|name| self.goes_on_beside(name));
     }
 
     /// A statement that sets a frame at any time.

@@ -6,6 +6,7 @@ use super::aggregate::index;
 use super::assigned::assigned;
 use super::motions::{MOVES, begins_spline};
 use crate::programs::references::{Calling, Given, Parameter, Passing, References, Which, parts};
+use crate::programs::routines::Routines;
 use crate::programs::scan::{Reader, TokenKind};
 
 /// Words before a bracket that call nothing.
@@ -31,6 +32,18 @@ pub(super) fn routine_name(reader: &Reader<'_>) -> Option<String> {
         "DEF" => word(first + 1),
         "DEFFCT" => word(first + 2),
         _ => None,
+    }
+}
+
+/// Notes the routines of a file: the first one has the name of the file and is there for all, as those that are `GLOBAL`.
+pub(super) fn routines_in(mut reader: Reader<'_>, all: &mut Routines) {
+    let mut is_first = true;
+    while !reader.done() {
+        if let Some(name) = routine_name(&reader) {
+            all.declare(name, reader.index, !is_first && !reader.ahead_is_word(0, "GLOBAL"));
+            is_first = false;
+        }
+        reader.skip_line();
     }
 }
 

@@ -35,6 +35,7 @@ use super::names::{plain_error, plain_names};
 use super::program::{Left, PoseTarget, Program, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use super::references::References;
+use super::routines::Routines;
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
@@ -79,6 +80,15 @@ fn has_moves(file: &TextFile) -> bool {
     !file.name.to_ascii_lowercase().ends_with(".dat")
 }
 
+/// Routines of all files.
+fn routines(files: &[TextFile]) -> Result<Routines> {
+    let mut all = Routines::default();
+    for (index, file) in files.iter().enumerate().filter(|(_, file)| has_moves(file)) {
+        calls::routines_in(Reader::new(file, index, DIALECT)?, &mut all);
+    }
+    Ok(all)
+}
+
 /// One reading, with what the one before found, and what it found itself.
 fn reading(
     files: &[TextFile],
@@ -96,7 +106,7 @@ fn reading(
         declared: Vec::new(),
         root: FrameIs::Unset,
         now: unset(),
-        flow: Flow::new(known),
+        flow: Flow::new(known).among(&routines(files)?),
         motion_data: None,
         path_data: None,
         spline: None,
@@ -167,6 +177,7 @@ struct Module<'a> {
 impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
         self.start_afresh();
+        self.flow.file_begins(reader.index);
         (self.now, self.motion_data, self.path_data, self.spline) = (unset(), None, None, None);
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {

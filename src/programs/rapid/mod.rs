@@ -11,7 +11,7 @@ mod unvisited;
 mod uses;
 mod value;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::ProgramSetting;
@@ -87,8 +87,8 @@ fn reading(
         data: BTreeMap::new(),
         bases: BTreeMap::new(),
         uses: BTreeMap::new(),
-        routines: BTreeSet::new(),
-        switching: Switching::new(known),
+        switching: Switching::new(known, scopes.routines()),
+        is_led: false,
         way: Itinerary::new(),
     };
     let mut references = References::default();
@@ -101,7 +101,6 @@ fn reading(
         task.switching.look_through(reader(file)?);
     }
     task.changed_by_calls(&references);
-    task.routines = references.routines().map(str::to_owned).collect();
     for file in files.iter().enumerate() {
         task.way.start_afresh();
         task.statements(reader(file)?)?;
@@ -119,10 +118,10 @@ struct Task<'a> {
     bases: BTreeMap<String, Target>,
     /// What statements that are no known moves do with points.
     uses: BTreeMap<String, Vec<Use>>,
-    /// Routines in the files: whatever their names, they are no instructions of the controller.
-    routines: BTreeSet<String>,
     /// What instructions switch for those behind them.
     switching: Switching,
+    /// True while something else corrects the path of the move that is being read.
+    is_led: bool,
     way: Itinerary,
 }
 
@@ -141,6 +140,7 @@ impl Task<'_> {
         }
         Ok(())
     }
+
     /// Assignments of a file to data of any.
     fn assignments(&mut self, mut reader: Reader<'_>) {
         while !reader.done() {
@@ -156,7 +156,6 @@ impl Task<'_> {
             reader.at += if is_type { 2 } else { 1 };
         }
     }
-
 
     /// `TYPE name := value;` behind its type.
     fn declaration(&mut self, reader: &mut Reader<'_>, kind: String) -> Result<()> {

@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use super::switching::ROUTINES;
+use super::switching::{ROUTINES, routine_name};
 use super::value::TYPES;
 use crate::programs::names::in_scope;
+use crate::programs::routines::Routines;
 use crate::programs::scan::Reader;
 
 /// Where data are declared: the file, and the routine in it.
@@ -24,6 +25,8 @@ pub(super) struct Scopes {
     declared: BTreeMap<String, Vec<Declaration>>,
     /// Tokens of the routines of each file.
     routines: BTreeMap<usize, Vec<Range<usize>>>,
+    /// Names of the routines.
+    named: Routines,
 }
 
 impl Scopes {
@@ -35,6 +38,7 @@ impl Scopes {
             let routines = self.routines.entry(reader.index).or_default();
             if ROUTINES.contains(&word.as_str()) {
                 begin = Some(reader.at);
+                self.named.declare(routine_name(&reader), reader.index, reader.ahead_is_word(-1, "LOCAL"));
             } else if word.strip_prefix("END").is_some_and(|kind| ROUTINES.contains(&kind)) {
                 routines.extend(begin.take().map(|begin| begin..reader.at));
             } else if TYPES.contains(&word.as_str()) && !reader.ahead_is_word(-1, "FUNC") {
@@ -47,6 +51,11 @@ impl Scopes {
             }
             reader.at += 1;
         }
+    }
+
+    /// Routines of all files.
+    pub fn routines(&self) -> &Routines {
+        &self.named
     }
 
     /// Names of their own for words of a file that mean local data, where there are others of their name.

@@ -209,6 +209,7 @@ impl Task<'_> {
                 reader.at += 1;
                 continue;
             };
+        self.switching.file_begins(reader.index);
             if reader.at < begins {
                 self.switching.within(&word, &mut self.way);
                 reader.at += 1;
@@ -253,7 +254,7 @@ impl Task<'_> {
 
     /// Targets of a known instruction that moves the robot; the reader stands on its name.
     fn move_to(&self, reader: &Reader<'_>, word: &str) -> Option<Targets> {
-        targets_of(word).filter(|_| !self.routines.contains(word) && has_arguments(reader))
+        targets_of(word).filter(|_| !self.switching.has_routine(word) && has_arguments(reader))
     }
 
     /// A move; the reader stands on its name and ends on its semicolon.

@@ -3,6 +3,7 @@
 use super::switched::{DISPLACES, OFFSETS, Switched, Watched, switch};
 use crate::programs::flow::{Branching, Flow, Followed, Places};
 use crate::programs::itinerary::{Itinerary, Stands};
+use crate::programs::routines::Routines;
 use crate::programs::scan::{Reader, TokenKind};
 
 /// Beginnings of routines.
@@ -35,10 +36,20 @@ pub(super) struct Switching {
 }
 
 impl Switching {
-    /// With what the reading before found.
-    pub fn new(known: Places<Now>) -> Self {
+    /// With what the reading before found, and the routines of the files.
+    pub fn new(known: Places<Now>, routines: &Routines) -> Self {
         let now = (Switched::new([Watched::On; 2], false, false), Stands::default());
-        Self { switched_off: [false; 2], displaces: false, offsets: false, now, flow: Flow::new(known) }
+        Self { switched_off: [false; 2], displaces: false, offsets: false, now, flow: Flow::new(known).among(routines) }
+    }
+
+    /// A file begins.
+    pub fn file_begins(&mut self, file: usize) {
+        self.flow.file_begins(file);
+    }
+
+    /// True for a name that means a routine of the files here: whatever it is, it is no instruction of the controller.
+    pub fn has_routine(&self, name: &str) -> bool {
+        self.flow.has_routine(name)
     }
 
     /// What holds here.
