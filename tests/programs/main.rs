@@ -7,6 +7,7 @@ mod programs_support;
 #[path = "../said/mod.rs"]
 mod said;
 
+mod across_files;
 mod changing;
 mod frames;
 mod frames_study;
@@ -25,6 +26,7 @@ mod references;
 mod retarget;
 mod scopes;
 mod several_frames;
+mod script_calls;
 mod urscript;
 mod used;
 mod ways;

@@ -1,22 +1,26 @@
 //! URScript: `movej`, `movel`, `movep`, `movec`, `servoj`, `servoc`, `optimovej` and `optimovel` with joints `[..]` (rad) or poses `p[..]` (m, rotation vector in rad),
 //! written in the call or in a variable, `get_inverse_kin` around a pose, and `set_tcp`.
 
+mod active;
 mod arguments;
+mod calls;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::ProgramSetting;
 use super::field::{Field, FieldPlace};
-use super::flow::{Branching, Flow, Followed, Held, Places, settled};
+use super::flow::{Branching, Flow, Followed, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::program::{
     JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Understood,
 };
 use super::reason::{DeclaredPoint, LeftReason, Why};
+use super::routines::Routines;
 use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, exp_so3};
+use active::Active;
 
 const DIALECT: Dialect =
     Dialect { comment: b'#', quotes: b"\"'", header: None, based_numbers: false, latin_letters: false };
@@ -30,14 +34,6 @@ const MOVES: [(&[u8], usize, Way); 8] = [
     (b"servoc", 1, Way::Arc),
     (b"optimovej", 1, Way::Joints),
     (b"optimovel", 1, Way::Line),
-];
-/// Calls that begin and end a motion on top of that of the targets.
-const ON_TOP: [(&[u8], bool); 5] = [
-    (b"track_conveyor_linear", true),
-    (b"track_conveyor_circular", true),
-    (b"stop_conveyor_tracking", false),
-    (b"path_offset_enable", true),
-    (b"path_offset_disable", false),
 ];
 /// Statements that end with `end`.
 const BLOCKS: [&[u8]; 6] = [b"def", b"thread", b"if", b"while", b"switch", b"for"];
@@ -85,37 +81,46 @@ struct Argument {
 
 /// Reads scripts; each file is a program of its own.
 pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
-    let program = settled(|known| reading(&files, setting, known))?;
+    let mut routines = Routines::default();
+    for (index, file) in files.iter().enumerate() {
+        calls::routines_in(Reader::new(file, index, DIALECT)?, &mut routines);
+    }
+    let program = settled(|known| reading(&files, &routines, setting, known))?;
     Ok(Program { files, ..program })
 }
 
 /// One reading, with what the one before found, and what it found itself.
-fn reading(files: &[TextFile], setting: &ProgramSetting<'_>, known: Places<Now>) -> Result<(Program, Places<Now>)> {
-    let (mut way, mut flow) = (Itinerary::new(), Flow::new(known));
+fn reading(
+    files: &[TextFile],
+    routines: &Routines,
+    setting: &ProgramSetting<'_>,
+    known: Places<Now>,
+) -> Result<(Program, Places<Now>)> {
+    let (mut way, mut flow) = (Itinerary::new(), Flow::new(known).among(routines));
     for (index, file) in files.iter().enumerate() {
         way.start_afresh();
+        flow.file_begins(index);
         let mut script = Script {
             reader: Reader::new(file, index, DIALECT)?,
             setting,
             variables: BTreeMap::new(),
             computed: BTreeSet::new(),
             blocks: Vec::new(),
-            on_top: false,
-            now: (Held::new(setting.tool), Stands::default()),
+            handing_on: BTreeSet::new(),
+            perhaps: Vec::new(),
+            now: (Active::new(setting.tool), Stands::default()),
             flow: &mut flow,
             way: &mut way,
         };
         script.find_computed()?;
+        script.find_routines_that_hand_on();
         script.read()?;
     }
     Ok((way.finished(), flow.found()))
 }
 
-/// The active tool; `None` where it is not known.
-type Tool = Held<Option<Pose>>;
-
-/// With where the robot stands.
-type Now = (Tool, Stands);
+/// What statements have set, and where the robot stands.
+type Now = (Active, Stands);
 
 struct Script<'a> {
     reader: Reader<'a>,
@@ -126,8 +131,10 @@ struct Script<'a> {
     computed: BTreeSet<Vec<u8>>,
     /// Statements that wait for their `end`; true for routines.
     blocks: Vec<bool>,
-    /// True while the robot moves by more than its targets say.
-    on_top: bool,
+    /// Routines that hand what they are given on to one that is in none of the files.
+    handing_on: BTreeSet<String>,
+    /// Positions in variables to which a call in none of the files may go: where their numbers begin, and what is left where nothing else goes there.
+    perhaps: Vec<(usize, Left)>,
     now: Now,
     /// How it changes.
     flow: &'a mut Flow<Now>,
@@ -202,13 +209,12 @@ impl Script<'_> {
             } else if self.block(word, next) {
                 // Behind the name of a routine, too: there it is not called.
                 self.reader.at = at + 1 + usize::from(matches!(word, b"def" | b"thread"));
-            } else if let Some((_, begins)) = ON_TOP.iter().find(|(name, _)| *name == word) {
-                self.on_top = *begins;
+            } else if self.now.0.switched(word) {
                 self.reader.at = at + 1;
             } else if word == b"set_tcp" && next == Some(TokenKind::Mark(b'(')) {
                 self.reader.at += 2;
                 let value = self.argument()?;
-                self.now.0.set(match &value {
+                self.now.0.tool.set(match &value {
                     Value::Pose(fields, _) => Some(pose_of(fields)),
                     _ => None,
                 });
@@ -220,12 +226,11 @@ impl Script<'_> {
                 let value = self.value()?;
                 self.variables.insert(name, value);
             } else {
-                if next == Some(TokenKind::Mark(b'(')) {
-                    self.call(String::from_utf8_lossy(word).into_owned());
-                }
+                self.other_call();
                 self.reader.at = at + 1;
             }
         }
+        self.leave_unvisited();
         self.flow.all_end(&mut self.now);
         Ok(())
     }
@@ -252,7 +257,7 @@ impl Script<'_> {
                     .reader
                     .ahead(1)
                     .map_or_else(String::new, |t| String::from_utf8_lossy(self.reader.text(t)).into_owned());
-                self.flow.routine_begins(name, &mut self.now, &(Held::new(self.setting.tool), Stands::default()));
+                self.flow.routine_begins(name, &mut self.now, &(Active::new(self.setting.tool), Stands::default()));
             }
             _ if begins => {
                 self.way.branches_begin();
@@ -436,7 +441,7 @@ impl Script<'_> {
     }
 
     fn take(&mut self, name: &str, argument: Argument) -> Understood<()> {
-        if self.on_top {
+        if self.now.0.has_motion_on_top() {
             let words = "a conveyor or an offset of the path moves the tool on top of it";
             return Err(Why::new(LeftReason::FrameUnknown, words));
         }
@@ -467,7 +472,7 @@ impl Script<'_> {
     /// The tool that `set_tcp` has set.
     fn active_tool(&self) -> Understood<Pose> {
         let words = "its tool is not known: no set_tcp(p[..]) with numbers before it; give --tool";
-        self.now.0.value.ok_or_else(|| Why::new(LeftReason::ToolUnknown, words))
+        self.now.0.tool.value.ok_or_else(|| Why::new(LeftReason::ToolUnknown, words))
     }
 
     fn pose(&self, fields: [Field; 6], posture: MeantPosture, tool: Pose) -> PoseTarget {

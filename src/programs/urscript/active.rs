@@ -1,0 +1,61 @@
+//! What statements of a script set for the moves behind them.
+
+use crate::geom::Pose;
+use crate::programs::flow::{Followed, Held};
+
+/// What moves the tool on top of the targets, and how many such things there are.
+const CONVEYOR: usize = 0;
+const PATH_OFFSET: usize = 1;
+const ON_TOP: usize = 2;
+/// Calls that begin and end them.
+const SWITCHES: [(&[u8], usize, bool); 5] = [
+    (b"track_conveyor_linear", CONVEYOR, true),
+    (b"track_conveyor_circular", CONVEYOR, true),
+    (b"stop_conveyor_tracking", CONVEYOR, false),
+    (b"path_offset_enable", PATH_OFFSET, true),
+    (b"path_offset_disable", PATH_OFFSET, false),
+];
+
+/// What holds at a move.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Active {
+    /// The active tool; `None` where it is not known.
+    pub tool: Held<Option<Pose>>,
+    /// True for what may move the tool on top of the targets.
+    on_top: [Held<bool>; ON_TOP],
+}
+
+impl Active {
+    /// Where nothing has set anything yet.
+    pub fn new(tool: Option<Pose>) -> Self {
+        Self { tool: Held::new(tool), on_top: [false; ON_TOP].map(Held::new) }
+    }
+
+    /// A call that begins or ends a motion on top of that of the targets; false for any other.
+    pub fn switched(&mut self, call: &[u8]) -> bool {
+        let found = SWITCHES.iter().find(|(name, ..)| *name == call);
+        found.iter().for_each(|(_, which, begins)| self.on_top[*which].set(*begins));
+        found.is_some()
+    }
+
+    /// True where the robot may move by more than its targets say.
+    pub fn has_motion_on_top(&self) -> bool {
+        self.on_top.iter().any(|on_top| on_top.value)
+    }
+}
+
+impl Followed for Active {
+    fn merged(&self, other: &Self, why: &str) -> Self {
+        let on_top = [CONVEYOR, PATH_OFFSET].map(|k| self.on_top[k].merged(&other.on_top[k], |_, _| true));
+        Self { tool: Followed::merged(&self.tool, &other.tool, why), on_top }
+    }
+
+    fn at_top(&self) -> Self {
+        Self { tool: self.tool.at_top(), on_top: self.on_top.each_ref().map(Held::at_top) }
+    }
+
+    fn behind_call(&self, end: &Self) -> Self {
+        let on_top = [CONVEYOR, PATH_OFFSET].map(|k| self.on_top[k].behind_call(&end.on_top[k]));
+        Self { tool: self.tool.behind_call(&end.tool), on_top }
+    }
+}

@@ -1,0 +1,238 @@
+//! Calls that are no known moves: some move the robot to where the text does not tell, some are in none of the files.
+
+use std::collections::BTreeSet;
+
+use super::{BLOCKS, MOVES, Script, Value};
+use crate::programs::field::FieldPlace;
+use crate::programs::program::Left;
+use crate::programs::reason::{LeftReason, Why};
+use crate::programs::routines::Routines;
+use crate::programs::scan::{Reader, TokenKind};
+
+/// Calls behind which the robot stands elsewhere; true where it keeps its posture, because the tool moves a little or on a path.
+const ELSEWHERE: [(&str, bool); 5] =
+    [("speedj", false), ("freedrive_mode", false), ("teach_mode", false), ("speedl", true), ("force_mode", true)];
+/// Words before a bracket that call nothing.
+const WORDS: [&str; 13] =
+    ["and", "case", "elif", "for", "if", "in", "not", "or", "return", "run", "switch", "while", "xor"];
+/// Functions of the language that can be given a position and do not go there (Universal Robots, *The URScript Programming Language*).
+const READ: [&str; 47] = [
+    "add_frame",
+    "assert",
+    "attach_frame",
+    "convert_pose",
+    "get_forward_kin",
+    "get_inverse_kin",
+    "get_inverse_kin_has_solution",
+    "get_jacobian",
+    "get_jacobian_time_derivative",
+    "get_list_length",
+    "interpolate_pose",
+    "is_within_safety_limits",
+    "length",
+    "move_frame",
+    "norm",
+    "path_offset_set",
+    "path_offset_set_max_offset",
+    "point_dist",
+    "popup",
+    "pose_add",
+    "pose_dist",
+    "pose_inv",
+    "pose_sub",
+    "pose_trans",
+    "rpc_factory",
+    "rpy2rotvec",
+    "rotvec2rpy",
+    "rtde_set_watchdog",
+    "screw_driving",
+    "set_base_acceleration",
+    "set_gravity",
+    "set_payload",
+    "set_payload_cog",
+    "set_target_payload",
+    "set_tcp",
+    "size",
+    "socket_send_line",
+    "socket_send_string",
+    "socket_set_var",
+    "str_cat",
+    "textmsg",
+    "to_str",
+    "track_conveyor_circular",
+    "track_conveyor_linear",
+    "transpose",
+    "varmsg",
+    "wrench_trans",
+];
+
+/// A position that a call in none of the files is given, which may go there.
+struct Given {
+    /// Where its numbers begin, where a variable has them.
+    first_byte: Option<usize>,
+}
+
+/// A routine of a text.
+struct Routine {
+    name: String,
+    parameters: Vec<Vec<u8>>,
+    /// Calls that are given one of its parameters.
+    hands_on_to: Vec<String>,
+}
+
+/// Notes the routines of a file.
+pub(super) fn routines_in(mut reader: Reader<'_>, all: &mut Routines) {
+    while !reader.done() {
+        if matches!(reader.word(), Some(b"def" | b"thread"))
+            && let Some(name) = called(&reader, 1)
+        {
+            all.declare(name, reader.index, false);
+        }
+        reader.at += 1;
+    }
+}
+
+/// The word some tokens on.
+fn called(reader: &Reader<'_>, ahead: isize) -> Option<String> {
+    let token = reader.ahead(ahead).filter(|t| t.kind == TokenKind::Word)?;
+    Some(String::from_utf8_lossy(reader.text(token)).into_owned())
+}
+
+/// Name and closing bracket of the call on whose name the reader stands; methods of other computers (`camera.look(..)`) cannot move the robot.
+fn call(reader: &Reader<'_>) -> Option<(String, usize)> {
+    let is_call = reader.ahead_is_mark(1, b'(') && !reader.ahead_is_mark(-1, b'.');
+    let name = called(reader, 0).filter(|name| is_call && !WORDS.contains(&name.as_str()))?;
+    Some((name, reader.closing(reader.at + 1)?))
+}
+
+/// Words that are arguments, or elements of lists that are, of the call that ends at `close`; the reader stands on its name.
+fn arguments(reader: &Reader<'_>, close: usize) -> Vec<usize> {
+    let (mut all, mut at) = (Vec::new(), reader.at + 2);
+    while at < close {
+        let is_word = reader.token(at).is_some_and(|t| t.kind == TokenKind::Word);
+        if is_word && reader.token_is_mark(at + 1, b'(') {
+            at = reader.closing(at + 1).unwrap_or(close);
+        } else if is_word {
+            all.push(at);
+        }
+        at += 1;
+    }
+    all
+}
+
+impl Script<'_> {
+    /// Routines of the text that hand what they are given on to one that is in none of the files.
+    pub(super) fn find_routines_that_hand_on(&mut self) {
+        let mut open: Vec<Option<usize>> = Vec::new();
+        let mut routines: Vec<Routine> = Vec::new();
+        while !self.reader.done() {
+            let word = self.reader.word().unwrap_or_default();
+            if matches!(word, b"def" | b"thread") {
+                self.reader.at += 1;
+                let name = called(&self.reader, 0).unwrap_or_default();
+                open.push(Some(routines.len()));
+                routines.push(Routine { name, parameters: self.parameters(), hands_on_to: Vec::new() });
+            } else if BLOCKS.contains(&word) {
+                open.push(None);
+            } else if word == b"end" {
+                open.pop();
+            } else if let Some(within) = open.iter().rev().copied().flatten().next()
+                && let Some((name, close)) = call(&self.reader)
+            {
+                let arguments = arguments(&self.reader, close);
+                let texts = arguments.iter().filter_map(|at| Some(self.reader.text(self.reader.token(*at)?)));
+                let routine = &mut routines[within];
+                if texts.into_iter().any(|text| routine.parameters.iter().any(|p| p == text)) {
+                    routine.hands_on_to.push(name);
+                }
+            }
+            self.reader.at += 1;
+        }
+        self.reader.at = 0;
+        self.handing_on = handing_on(&routines, |name| self.is_unknown(name));
+    }
+
+    /// True for a routine that is in none of the files and no function of the language.
+    fn is_unknown(&self, name: &str) -> bool {
+        let is_of_language = READ.contains(&name)
+            || ELSEWHERE.iter().any(|(known, _)| *known == name)
+            || MOVES.iter().any(|(known, ..)| *known == name.as_bytes());
+        !is_of_language && !self.flow.has_routine(name)
+    }
+
+    /// A call that is no known move; the reader stands on its name.
+    pub(super) fn other_call(&mut self) {
+        let Some((name, close)) = call(&self.reader) else { return };
+        self.call(name.clone());
+        match ELSEWHERE.iter().find(|(known, _)| *known == name) {
+            Some((_, true)) => self.way.go_beyond(&mut self.now.1),
+            Some((_, false)) => self.way.lose(&mut self.now.1),
+            None => {}
+        }
+        if self.is_unknown(&name) || self.handing_on.contains(&name) {
+            let all: Vec<Given> = arguments(&self.reader, close).into_iter().filter_map(|at| self.given(at)).collect();
+            all.into_iter().for_each(|given| self.goes_perhaps(&name, given));
+        }
+    }
+
+    /// The position that stands at a token, `p[..]` or a variable with one.
+    fn given(&self, at: usize) -> Option<Given> {
+        let name = self.reader.text(self.reader.token(at)?);
+        if self.reader.token_is_mark(at + 1, b'[') {
+            // `w[2]` is a number of a position.
+            return (name == b"p").then_some(Given { first_byte: None });
+        }
+        match self.variables.get(name).filter(|_| !self.computed.contains(name))? {
+            Value::Pose(fields, _) => {
+                let starts = fields.iter().filter_map(|field| match &field.place {
+                    FieldPlace::At(range) => Some(range.start),
+                    FieldPlace::Missing(..) => None,
+                });
+                Some(Given { first_byte: starts.min() })
+            }
+            _ => None,
+        }
+    }
+
+    /// The robot goes there, or does not.
+    fn goes_perhaps(&mut self, name: &str, given: Given) {
+        let words = format!(
+            "{name} is in none of the files, or hands it on to such a one: what that does with it is not known"
+        );
+        let why = Why::new(LeftReason::NotATarget, words);
+        let left = Left { file: self.reader.index, line: self.reader.line(), name: name.to_owned(), why };
+        match given.first_byte {
+            None => self.way.leave(left, false, &mut self.now.1),
+            Some(first_byte) => {
+                self.way.lose(&mut self.now.1);
+                self.perhaps.push((first_byte, left));
+            }
+        }
+    }
+
+    /// Positions in variables to which only such calls may go.
+    pub(super) fn leave_unvisited(&mut self) {
+        for (first_byte, left) in std::mem::take(&mut self.perhaps) {
+            let targets = &self.way.program.targets;
+            if !targets.iter().any(|t| t.file == left.file && t.kind.first_byte() == first_byte) {
+                self.way.program.left.push(left);
+            }
+        }
+    }
+}
+
+/// Routines that hand a parameter on to an unknown one, at once or by way of others.
+fn handing_on(routines: &[Routine], is_unknown: impl Fn(&str) -> bool) -> BTreeSet<String> {
+    let mut all = BTreeSet::new();
+    loop {
+        let before = all.len();
+        for routine in routines {
+            if routine.hands_on_to.iter().any(|name| is_unknown(name) || all.contains(name)) {
+                all.insert(routine.name.clone());
+            }
+        }
+        if all.len() == before {
+            return all;
+        }
+    }
+}
