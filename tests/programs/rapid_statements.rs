@@ -233,3 +233,62 @@ fn points_of_an_unknown_routine_are_not_taken_for_those_of_the_world() {
         }
     }
 }
+
+/// `\WObj?w` hands on what the routine may have been given, or nothing.
+#[test]
+fn a_work_object_that_may_be_handed_on_or_not_is_not_known() {
+    let cell = Cell::kuka(215);
+    let frame = LeftReason::FrameUnknown.name();
+    let go = |step: &str| format!("go\\w:=wTable;\nENDPROC\nPROC go(\\PERS wobjdata w\\PERS loaddata load)\n{step}");
+    let all = ["--work=279.75,-60,23.5,0.707106781,0,0,0.707106781"];
+    for (body, flags, corrected, left) in [
+        (go("MoveL p1,v1,z1,tGun\\WObj?w;"), vec![], 0, vec![frame]),
+        (go("MoveL p1,v1,z1,tGun\\WObj?w;"), all.to_vec(), 0, vec![frame]),
+        (go("MoveL @,v1,z1,tGun\\WObj?w\\TLoad?load;"), vec![], 0, vec![frame]),
+        (go("MoveL @,v1\\V?x,z1,tGun\\TLoad?load\\WObj:=wTable;"), vec![], 1, vec![]),
+        (go("MoveL\\Conc?x,@,v1,z1,tGun\\WObj:=wTable;"), vec![], 1, vec![]),
+        (go("CapL p1,v1,tGun\\WObj?w;"), all.to_vec(), 0, vec![LeftReason::Unvisited.name()]),
+    ] {
+        let told = run(&cell, &body, &flags).1.told();
+        let found: Vec<&str> = told.left.iter().map(|(.., reason)| reason.as_str()).collect();
+        assert_eq!((told.corrected, found), (corrected, left), "{body} {flags:?}");
+    }
+}
+
+/// What a routine sets that it is given by way of another one, which may have been given it or not.
+#[test]
+fn a_point_that_is_handed_on_as_it_may_be_is_computed_where_it_is_set() {
+    let cell = Cell::kuka(216);
+    let computed = vec![LeftReason::Computed.name().to_owned()];
+    let routines = "ENDPROC\nPROC outer(\\VAR robtarget a)\ninner\\b?a;\nENDPROC\nPROC inner(\\VAR robtarget b)";
+    for (inner, left) in [("b.trans.z:=9;", computed), ("TPWrite \"\";", vec![])] {
+        let body = format!("MoveJ p1,v1,z1,tGun\\WObj:=wTable;\nouter\\a:=p1;\n{routines}\n{inner}");
+        let text = module(&cell, &body).replace("CONST robtarget", "VAR robtarget");
+        let file = cell.write("m.mod", text.as_bytes());
+        let told = cell.compensate(&[&file], &["--unordered"]).told();
+        let found: Vec<String> = told.left.into_iter().map(|(.., reason)| reason).collect();
+        assert_eq!((told.corrected, &found), (1 - left.len(), &left), "{inner}");
+    }
+}
+
+#[test]
+fn moves_whose_path_something_else_corrects_are_left() {
+    let cell = Cell::kuka(217);
+    let (work, frame) = ("\\WObj:=wTable;", LeftReason::FrameUnknown.name());
+    for (body, corrected, left) in [
+        (format!("MoveL @,v1,z1,tGun\\Corr{work}"), 0, vec![frame]),
+        (format!("MoveL @,v1,z1,tGun{work}\nMoveL p1,v1,z1,tGun\\WObj:=wTable\\Corr;"), 1, vec![frame]),
+        (format!("MoveL p1,v1,z1,tGun{work}\nMoveL Offs(p1,0,0,9),v1,z1,tGun\\Corr?x{work}"), 1, vec![frame]),
+        (format!("MoveC @,@,v1,z1,tGun\\Corr{work}"), 0, vec![frame, frame]),
+        (
+            format!("ArcL @,v1,seam,weld,z1,tGun\\WObj:=wTable\\Track:=follow;\nMoveL @,v1,z1,tGun{work}"),
+            1,
+            vec![frame],
+        ),
+        (format!("CorrCon id;\nMoveL @,v1,z1,tGun{work}\nMoveAbsJ #,v1,z1,tGun;"), 2, vec![]),
+    ] {
+        let told = run(&cell, &body, &[]).1.told();
+        let found: Vec<&str> = told.left.iter().map(|(.., reason)| reason.as_str()).collect();
+        assert_eq!((told.corrected, found), (corrected, left), "{body}");
+    }
+}

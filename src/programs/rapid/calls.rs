@@ -107,7 +107,9 @@ fn given(reader: &mut Reader<'_>, range: Range<usize>) -> Vec<Given> {
         }
         for switch in pieces {
             let named = reader.name_of(switch.start);
-            let value = name_of(reader, (switch.start + 3).min(switch.end)..switch.end);
+            // `\NAME:=value`, or `\NAME?parameter`.
+            let behind = if reader.token_is_mark(switch.start + 1, b'?') { 2 } else { 3 };
+            let value = name_of(reader, (switch.start + behind).min(switch.end)..switch.end);
             all.extend(named.zip(value).map(|(named, name)| Given { which: Which::Named(named), name }));
         }
     }

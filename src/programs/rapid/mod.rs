@@ -348,6 +348,10 @@ impl Task<'_> {
             let words = "a program displacement (PDispOn, PDispSet) may be active";
             return Err(Why::new(LeftReason::FrameUnknown, words));
         }
+        if self.is_led {
+            let words = "a sensor or the program moves the tool off it (\\Corr, \\Track)";
+            return Err(Why::new(LeftReason::FrameUnknown, words));
+        }
         let computed = || Why::new(LeftReason::Computed, "it is computed, not written in numbers");
         let trans = numbers::<3>(&parts[0]).ok_or_else(computed)?;
         let [w, x, y, z] = numbers::<4>(&parts[1]).ok_or_else(computed)?;

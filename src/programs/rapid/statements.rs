@@ -39,6 +39,8 @@ pub(super) const CONTROL: [&str; 26] = [
     "BACKWARD",
     "THEN",
 ];
+/// Switches of a move whose path something else corrects: `CorrWrite`, a sensor that tracks the seam.
+const LED: [&str; 2] = ["CORR", "TRACK"];
 /// Words between two operands.
 pub(super) const OPERATORS: [&str; 6] = ["AND", "OR", "XOR", "NOT", "DIV", "MOD"];
 
@@ -142,6 +144,8 @@ struct Arguments {
     plain: Vec<Argument>,
     /// The work object, behind its switch.
     work: Option<Node>,
+    /// True where something else corrects the path.
+    is_led: bool,
 }
 
 /// One that stands between commas.
@@ -162,9 +166,9 @@ fn arguments(reader: &mut Reader<'_>, (name, line): (&str, usize)) -> Result<Arg
             return Err(Error::new(Code::ProgramSyntax, format!("{file}:{line}"), what, "complete the instruction"));
         }
         if reader.take_mark(b'\\') {
-            if let Some(work) = switch(reader)? {
-                read.work = Some(work);
-            }
+            let (name, value) = switch(reader)?;
+            read.is_led |= LED.contains(&name.as_str());
+            read.work = value.filter(|_| name == "WOBJ").or(read.work);
         } else if reader.is_mark(b';') {
             return Ok(read);
         } else if !reader.take_mark(b',') {
@@ -173,13 +177,17 @@ fn arguments(reader: &mut Reader<'_>, (name, line): (&str, usize)) -> Result<Arg
     }
 }
 
-/// Reads a switch behind its stroke; what it gives, where it is the work object.
-fn switch(reader: &mut Reader<'_>) -> Result<Option<Node>> {
-    let is_work = reader.ahead_is_word(0, "WOBJ");
+/// Reads a switch behind its stroke: its name and what it gives, `\NAME:=value` or `\NAME?parameter`, which may be there or not.
+fn switch(reader: &mut Reader<'_>) -> Result<(String, Option<Node>)> {
+    let name = reader.name().unwrap_or_default();
     reader.at += 1;
+    if reader.take_mark(b'?') {
+        reader.at += 1;
+        return Ok((name, Some(Node::Other)));
+    }
     let has_value = reader.take_mark(b':') && reader.take_mark(b'=');
     let value = has_value.then(|| node(reader)).transpose()?;
-    Ok(value.filter(|_| is_work))
+    Ok((name, value))
 }
 
 /// Reads an argument up to the comma, switch or semicolon behind it.
@@ -201,6 +209,7 @@ impl Task<'_> {
     pub(super) fn statements(&mut self, mut reader: Reader<'_>) -> Result<()> {
         // Conditions of one line, which end with the statement behind them.
         let (mut begins, mut conditions) = (0, 0_usize);
+        self.switching.file_begins(reader.index);
         while !reader.done() {
             if reader.ahead_is_mark(-1, b';') {
                 (0..std::mem::take(&mut conditions)).for_each(|_| self.switching.branches_end(&mut self.way));
@@ -209,7 +218,6 @@ impl Task<'_> {
                 reader.at += 1;
                 continue;
             };
-        self.switching.file_begins(reader.index);
             if reader.at < begins {
                 self.switching.within(&word, &mut self.way);
                 reader.at += 1;
@@ -262,7 +270,8 @@ impl Task<'_> {
         let line = reader.line();
         let name = String::from_utf8_lossy(reader.word().unwrap_or_default()).into_owned();
         reader.at += 1;
-        let Arguments { mut plain, work } = arguments(reader, (&name, line))?;
+        let Arguments { mut plain, work, is_led } = arguments(reader, (&name, line))?;
+        self.is_led = is_led;
         plain.drain(..plain.len().min(targets.skipped));
         let count = targets.count.min(plain.len());
         let tool = self.tool_of(&plain, count);
@@ -275,6 +284,7 @@ impl Task<'_> {
                 self.leave((reader.index, line), &name, why);
             }
         }
+        self.is_led = false;
         Ok(())
     }
 

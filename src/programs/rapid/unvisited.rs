@@ -24,6 +24,12 @@ impl Task<'_> {
                 continue;
             };
             reader.at += 1;
+            if is_switch && reader.take_mark(b'?') {
+                // What it hands on may be there or not.
+                reader.at += 1;
+                work = if word == "WOBJ" { Some(Node::Other) } else { work };
+                continue;
+            }
             let assigned = is_switch && reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');
             if assigned {
                 reader.at += 2;
