@@ -58,7 +58,7 @@ impl Module<'_> {
             let is_called = reader.token_is_mark(at + 1, b'(');
             if is_called && is_beside {
                 self.begins_beside(name);
-            } else if is_called && self.routines.contains(&name) {
+            } else if is_called && self.routines.is_seen(&name, reader.index) {
                 self.way.call(name, &mut self.flow, &mut self.now);
             } else if is_called && !is_motion {
                 self.calls_unknown(reader, name, at + 1);

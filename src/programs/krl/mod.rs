@@ -15,7 +15,7 @@ mod stated;
 mod unvisited;
 mod uses;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use aggregate::{Aggregate, index};
@@ -97,6 +97,7 @@ fn reading(
     known: Places<Now>,
 ) -> Result<(Program, Places<Now>)> {
     let reader = |index: usize, file| Reader::renamed(file, index, DIALECT, |reader| scopes.names(reader));
+    let routines = routines(files)?;
     let mut module = Module {
         setting,
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
@@ -106,11 +107,11 @@ fn reading(
         declared: Vec::new(),
         root: FrameIs::Unset,
         now: unset(),
-        flow: Flow::new(known).among(&routines(files)?),
+        flow: Flow::new(known).among(&routines),
         motion_data: None,
         path_data: None,
         spline: None,
-        routines: BTreeSet::new(),
+        routines,
         copies: Copies::default(),
         given: Vec::new(),
         way: Itinerary::new(),
@@ -124,7 +125,6 @@ fn reading(
         }
     }
     module.assigned.changed_by_calls(&references);
-    module.routines = references.routines().map(str::to_owned).collect();
     // Data first: programs use them in whatever order the files are given.
     for wanted in [false, true] {
         for (index, file) in files.iter().enumerate().filter(|(_, f)| has_moves(f) == wanted) {
@@ -166,7 +166,7 @@ struct Module<'a> {
     /// Frames of the spline block that is open.
     spline: Option<OwnFrames>,
     /// Routines in the files.
-    routines: BTreeSet<String>,
+    routines: Routines,
     /// Copies of names that had no value yet.
     copies: Copies,
     /// Variables that routines in none of the files are given.
