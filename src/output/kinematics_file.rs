@@ -30,6 +30,9 @@ const SAME_M: f64 = 1e-6;
 /// Loss (m) from which a file cannot stand for the corrected URDF.
 const LOSS_M: f64 = 1e-6;
 
+/// The flange of every robot of Universal Robots stands further than this (m) from the axis of its second wrist joint.
+const FLANGE_OFF_WRIST_2_M: f64 = 0.05;
+
 /// Robot descriptions (packages of ROS) that read a file of kinematics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Package {
@@ -44,6 +47,8 @@ struct Reader {
     keyed: Vec<(String, String)>,
     /// Pose behind the last joint that the package has nowhere else, and takes up in that joint.
     behind: Pose,
+    /// The tip of the chain behind the last joint as the package has it, where it is fixed there.
+    tip: Option<Pose>,
 }
 
 /// Corrected origins of a robot in the layout that its own description reads, under the names of its joints where none does; `note`
@@ -51,7 +56,8 @@ struct Reader {
 pub fn kinematics_yaml(robot: &Robot, description: &RobotDescription, note: &str) -> String {
     let Some(reader) = recognised(description, &robot.chain) else {
         let head = "# Corrected joint origins (m, rad) under the joint names of the URDF, for programs of your own: this is none of the robots whose description\n\
-                    # reads a file of kinematics (ur_description, franka_description, xarm_description). The URDF and the xacro file beside it say the same.";
+                    # reads a file of kinematics (ur_description with a flange tool0, franka_description, xarm_description). The URDF and the xacro file\n\
+                    # beside it say the same.";
         let origins = robot.urdf_origins();
         let body: String = origins.iter().map(|(name, o)| entry("  ", name, o)).collect();
         return format!("{head} {note}\nkinematics:\n{body}");
@@ -84,25 +90,48 @@ fn recognised(description: &RobotDescription, chain: &Chain) -> Option<Reader> {
     let all_along_z = |keyed: &[(String, String)]| keyed.iter().all(|(_, joint)| along_z(joint));
     if let Some(prefix) = first(UR[0].1) {
         let keyed: Vec<_> = UR.iter().map(|(key, joint)| ((*key).to_owned(), format!("{prefix}{joint}"))).collect();
-        let (_, wrist) = description.joint_links(&keyed[5].1)?;
-        let behind = description.rigid_pose(wrist, &format!("{prefix}tool0")).unwrap_or_else(Pose::identity);
-        let fits = all_along_z(&keyed) && turns_about_z(&behind);
-        let (angle, distance) = behind.distance(&Pose::identity());
-        let behind = if angle < SAME_RAD && distance < SAME_M { Pose::identity() } else { behind };
-        return fits.then_some(Reader { package: Package::Ur, keyed, behind });
+        let flange = Flange::of(description, chain, &prefix, &keyed[5].1).filter(|_| all_along_z(&keyed))?;
+        return Some(Reader { package: Package::Ur, keyed, behind: flange.behind, tip: flange.tip });
     }
     let prefix = first("joint1")?;
     let franka = numbered(&prefix, 7);
     let last = format!("{prefix}joint8");
     if all_along_z(&franka) && description.fixed_joint(&last).is_some() {
         let keyed = franka.into_iter().chain([("joint8".to_owned(), last)]).collect();
-        return Some(Reader { package: Package::Franka, keyed, behind: Pose::identity() });
+        return Some(Reader { package: Package::Franka, keyed, behind: Pose::identity(), tip: None });
     }
     let count = XARM.into_iter().find(|&count| all_along_z(&numbered(&prefix, count)))?;
     let (base, _) = description.joint_links(&format!("{prefix}joint1"))?;
     let keyed = numbered(&prefix, count);
     let of_xarm = base == format!("{prefix}link_base") && chain.readings.len() == count;
-    of_xarm.then_some(Reader { package: Package::XArm, keyed, behind: Pose::identity() })
+    of_xarm.then_some(Reader { package: Package::XArm, keyed, behind: Pose::identity(), tip: None })
+}
+
+/// The flange of a robot of Universal Robots. In ur_description it is the frame of the last joint.
+struct Flange {
+    /// `wrist_from_flange`, which the last joint takes up.
+    behind: Pose,
+    /// `flange_from_tip`, where the tip of the chain is fixed to it.
+    tip: Option<Pose>,
+}
+
+impl Flange {
+    /// The link tool0; without one the frame of the last joint, or else the tip of the chain, where that stands as a flange does.
+    fn of(description: &RobotDescription, chain: &Chain, prefix: &str, wrist_3: &str) -> Option<Self> {
+        let (_, wrist) = description.joint_links(wrist_3)?;
+        let tip = description.rigid_pose(wrist, &chain.tip);
+        let own = format!("{prefix}tool0");
+        let named = [own.as_str(), "tool0"].into_iter().find_map(|link| description.rigid_pose(wrist, link));
+        let mut others = description.links().filter(|link| link.ends_with("tool0"));
+        let named = named.or_else(|| others.find_map(|link| description.rigid_pose(wrist, link)));
+        let origin = chain.joints.iter().find(|j| j.name == wrist_3)?.origin;
+        let is_off = |behind: &Pose| (origin * *behind).translation.xy().norm() > FLANGE_OFF_WRIST_2_M;
+        let unnamed = || [Some(Pose::identity()), tip].into_iter().flatten().find(is_off);
+        let behind = named.or_else(unnamed).filter(turns_about_z)?;
+        let (angle, distance) = behind.distance(&Pose::identity());
+        let behind = if angle < SAME_RAD && distance < SAME_M { Pose::identity() } else { behind };
+        Some(Self { behind, tip: tip.map(|tip| behind.inverse() * tip) })
+    }
 }
 
 /// True for a pose that a rotation about z can be exchanged with.
@@ -146,16 +175,33 @@ impl Reader {
         read
     }
 
-    /// How far the flange of the chain with these origins is from that of the corrected URDF, at random postures.
+    /// How far the flange of the chain that the package makes of these origins is from that of the corrected URDF, at random postures.
     fn loss_m(&self, robot: &Robot, read: &[Pose]) -> f64 {
         let of = |origins: &[Pose]| {
             let mut chain = robot.chain.clone();
             chain.joints.iter_mut().zip(origins).for_each(|(j, o)| j.origin = *o);
             Robot::nominal(chain)
         };
-        let (corrected, read) = (of(&robot.corrected_origins()), of(read));
+        let (corrected, read) = (of(&robot.corrected_origins()), of(&self.of_package(&robot.chain, read)));
         let distances = postures(&robot.chain).map(|q| corrected.base_from_tip(&q).distance(&read.base_from_tip(&q)).1);
         distances.fold(0.0, f64::max)
+    }
+
+    /// Origins of the chain in the package: what is fixed behind the last joint stands there as the package has it.
+    fn of_package(&self, chain: &Chain, read: &[Pose]) -> Vec<Pose> {
+        let mut all = read.to_vec();
+        let last = self.keyed.last().and_then(|(_, name)| chain.joints.iter().position(|j| j.name == *name));
+        let (Some(last), Some(tip)) = (last, self.tip) else { return all };
+        all[last] = read[last] * self.behind;
+        match all.get_mut(last + 1..) {
+            Some([first, others @ ..]) => {
+                *first = tip;
+                others.fill(Pose::identity());
+            }
+            // Turns about z may be exchanged.
+            _ => all[last] = all[last] * tip,
+        }
+        all
     }
 
     /// The entries, those of joints beside the chain as the URDF has them.

@@ -258,43 +258,77 @@ fn assert_same(what: &str, one: Pose, other: Pose) {
     assert!(rad < 1e-9 && m < 1e-9, "{what}: {m:e} m, {rad:e} rad");
 }
 
+#[derive(Deserialize)]
+struct File {
+    kinematics: Links,
+}
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Links {
+    shoulder: Origin,
+    upper_arm: Origin,
+    forearm: Origin,
+    wrist_1: Origin,
+    wrist_2: Origin,
+    wrist_3: Origin,
+    hash: String,
+}
+
+/// Flange of ur_description with this file, base_link_inertia at `before`; tool0 is wrist_3_link there.
+fn read_by_ur_description(file: &File, before: Pose, q: &[f64]) -> Pose {
+    let k = &file.kinematics;
+    let links = [k.shoulder, k.upper_arm, k.forearm, k.wrist_1, k.wrist_2, k.wrist_3];
+    links.iter().zip(q).fold(before, |pose, (link, q)| pose * link.turned(*q))
+}
+
 #[test]
 fn kinematics_yaml_of_a_ur_is_what_ur_description_reads() {
-    #[derive(Deserialize)]
-    struct File {
-        kinematics: Links,
-    }
-    #[derive(Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct Links {
-        shoulder: Origin,
-        upper_arm: Origin,
-        forearm: Origin,
-        wrist_1: Origin,
-        wrist_2: Origin,
-        wrist_3: Origin,
-        hash: String,
-    }
     let q = [0.3, -1.2, 0.9, 2.0, -0.7, 1.4];
     let mut hashes = Vec::new();
     for (prefix, base) in [("", None), ("left_", None), ("", Some("base"))] {
         let description = ur("0 0 1", prefix);
         let robot = off(&description, base);
         let file: File = serde_saphyr::from_str(&kinematics_yaml(&robot, &description, "")).unwrap();
-        let k = file.kinematics;
-        let links = [k.shoulder, k.upper_arm, k.forearm, k.wrist_1, k.wrist_2, k.wrist_3];
-        // base_link_inertia is turned by half a turn in base_link, and stands as base does; tool0 is wrist_3_link.
+        // base_link_inertia is turned by half a turn in base_link, and stands as base does.
         let half = Pose::from_xyz_rpy([0.0; 3], [0.0, 0.0, std::f64::consts::PI]);
         let before = if base.is_none() { half } else { Pose::identity() };
-        let read = links.iter().zip(q).fold(before, |pose, (link, q)| pose * link.turned(q));
-        assert_same("ur", read, exported(&robot, &description, &q));
-        hashes.push(k.hash);
+        assert_same("ur", read_by_ur_description(&file, before, &q), exported(&robot, &description, &q));
+        hashes.push(file.kinematics.hash);
     }
     assert!(!hashes[0].is_empty() && hashes[0] == hashes[1] && hashes[0] != hashes[2], "{hashes:?}");
     // The older description of the same joint names has other axes, and reads no such file.
     let older = ur("0 1 0", "");
     let text = kinematics_yaml(&off(&older, None), &older, "");
     assert!(text.contains("shoulder_pan_joint:") && !text.contains("hash:"), "{text}");
+}
+
+/// The frames of its URDF end before the flange, which ur_description has in the last joint: 0.11655 m.
+#[test]
+fn the_flange_of_a_ur_is_found_whatever_its_link_is_called() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf");
+    let plain = std::fs::read_to_string(path).unwrap();
+    let q = [0.3, -1.2, 0.9, 2.0, -0.7, 1.4];
+    let of = |text: String| {
+        let description = RobotDescription::from_text(Path::new("ur10e.urdf"), text).unwrap();
+        let robot = off(&description, None);
+        (kinematics_yaml(&robot, &description, ""), exported(&robot, &description, &q))
+    };
+    for text in [
+        plain.clone(),
+        plain.replace("\"tool0\"", "\"flange\""),
+        plain.replace("\"tool0\"", "\"my_tool0\""),
+        plain.replace("<joint name=\"", "<joint name=\"left_"),
+    ] {
+        let (yaml, flange) = of(text);
+        let file: File = serde_saphyr::from_str(&yaml).unwrap();
+        assert!((file.kinematics.wrist_3.y - 0.11655).abs() < 5e-3, "{yaml}");
+        assert_same("ur10e", read_by_ur_description(&file, Pose::identity(), &q), flange);
+        assert!(!yaml.contains("WARNING"), "{yaml}");
+    }
+    // A camera beside the flange, whose own frame has no link: nobody knows where tool0 is to be.
+    let camera = plain.replace("\"tool0\"", "\"camera\"").replace("0 0 0.11655", "0.1 0 0.02");
+    let (yaml, _) = of(camera);
+    assert!(yaml.contains("wrist_3_joint:") && !yaml.contains("hash:"), "{yaml}");
 }
 
 #[test]
