@@ -13,6 +13,7 @@ mod controller;
 mod hostile;
 mod images;
 mod mcap;
+mod parts;
 mod plate;
 mod real;
 mod recorded;

@@ -9,11 +9,11 @@ use robotcal::series::{Clock, Extracted, Motion, Picking, RecordingOptions, extr
 use robotcal::{Code, Error};
 use tempfile::TempDir;
 
-const STOPS: usize = 5;
+pub const STOPS: usize = 5;
 const START_NS: i64 = 1_700_000_000_000_000_000;
 const SIZE: (u32, u32) = (32, 24);
 
-fn recording(name: &str) -> PathBuf {
+pub fn recording(name: &str) -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recordings")).join(name)
 }
 
@@ -21,17 +21,17 @@ fn options(joints: &[&str]) -> RecordingOptions {
     RecordingOptions { joints: joints.iter().map(|j| j.to_string()).collect(), ..RecordingOptions::default() }
 }
 
-fn three() -> RecordingOptions {
+pub fn three() -> RecordingOptions {
     options(&["joint_1", "joint_2", "joint_3"])
 }
 
-fn read(path: &Path, options: &RecordingOptions) -> (TempDir, Extracted) {
+pub fn read(path: &Path, options: &RecordingOptions) -> (TempDir, Extracted) {
     let folder = tempfile::tempdir().unwrap();
     let extracted = extract(path, &folder.path().join("images"), options).unwrap_or_else(|e| panic!("{e}"));
     (folder, extracted)
 }
 
-fn refusal(path: &Path, options: &RecordingOptions) -> Error {
+pub fn refusal(path: &Path, options: &RecordingOptions) -> Error {
     let folder = tempfile::tempdir().unwrap();
     let error = extract(path, folder.path(), options).unwrap_err();
     assert_eq!(error.exit_code(), 2);
@@ -40,7 +40,7 @@ fn refusal(path: &Path, options: &RecordingOptions) -> Error {
 }
 
 /// The formulas of make_recordings.py.
-fn posture(stop: usize) -> [f64; 3] {
+pub fn posture(stop: usize) -> [f64; 3] {
     let k = stop as f64;
     [0.1 * k, 0.5 - 0.2 * k, if stop.is_multiple_of(2) { 0.25 } else { -0.25 }]
 }

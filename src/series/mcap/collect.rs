@@ -126,7 +126,8 @@ impl<'a> Collector<'a> {
     /// Chooses or averages the pictures of a stop and writes the result.
     fn close(&mut self, stop: usize) -> Result<()> {
         self.open[stop].done = true;
-        let frames = std::mem::take(&mut self.open[stop].frames);
+        let mut frames = std::mem::take(&mut self.open[stop].frames);
+        frames.sort_by_key(|(time, _)| *time);
         self.held -= frames.iter().map(|(_, frame)| frame.bytes()).sum::<usize>();
         let mut mean = Mean::default();
         let mut seen: Vec<(usize, f64)> = Vec::new();

@@ -13,10 +13,13 @@ mod file;
 mod frame;
 #[cfg(feature = "mcap")]
 mod interfaces;
+mod kind;
 mod message;
 mod messages;
 mod motion;
 mod options;
+mod order;
+mod parts;
 mod pixels;
 #[cfg(feature = "mcap")]
 mod records;

@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use super::cdr::Decoded;
-use super::file::{files_of, for_each};
+use super::file::for_each;
 use super::message::Message;
 use super::messages::{self, CameraInfo, JointState};
 use super::options::{Clock, RecordingOptions};
+use super::order::{Written, twice};
+use super::parts::{Parts, parts_of};
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::series::InputFile;
 
@@ -41,10 +43,9 @@ struct Topic {
     malformed: usize,
     reason: String,
     unstamped: bool,
-    /// Time from stamp to recording, ns.
-    delays_ns: Vec<i64>,
-    /// Latest time so far, ns.
-    latest_ns: Option<i64>,
+    /// Times of recording, with the time from the stamp to there, ns.
+    delays_ns: Vec<(i64, i64)>,
+    written: Written,
 }
 
 /// Everything of the first pass.
@@ -56,8 +57,6 @@ pub(super) struct Scan {
     joints: BTreeMap<String, Vec<JointSample>>,
     images: BTreeMap<String, Vec<i64>>,
     infos: BTreeMap<String, CameraInfo>,
-    /// Times that were there twice, because a clock was set back, ns.
-    twice: Vec<Range<i64>>,
     /// Memory of the joint samples, bytes.
     held: usize,
     pub notices: Vec<Notice>,
@@ -66,8 +65,8 @@ pub(super) struct Scan {
 
 /// Reads a recording once.
 pub(super) fn scan(recording: &Path, clock: Clock) -> Result<Scan> {
-    let files = files_of(recording)?;
-    let mut scan = Scan { recording: recording.to_path_buf(), files, ..Scan::default() };
+    let Parts { files, notices } = parts_of(recording)?;
+    let mut scan = Scan { recording: recording.to_path_buf(), files, notices, ..Scan::default() };
     for path in scan.files.clone() {
         let damage = for_each(&path, |message| {
             scan.note(&message, clock);
@@ -83,9 +82,6 @@ pub(super) fn scan(recording: &Path, clock: Clock) -> Result<Scan> {
 
 /// Memory of all joint samples of a recording, bytes: some hours at 500 Hz.
 const MOST_HELD: usize = 512 << 20;
-
-/// By how much times may go back without a clock that was set, ns: pictures that are compressed side by side come out of order.
-const SET_BACK_NS: i64 = 500_000_000;
 
 /// Latest time of recording, ns (in the year 2096): later ones are damaged, and differences of times stay numbers.
 const LATEST_NS: u64 = 4_000_000_000_000_000_000;
@@ -158,27 +154,28 @@ impl Scan {
     }
 
     fn stamped(&mut self, message: &Message<'_>, stamp_ns: i64, clock: Clock) -> i64 {
+        let (time_ns, log_ns) = (time_ns(stamp_ns, message, clock), log_time_ns(message));
         if let Some(topic) = self.topics.get_mut(message.topic) {
             match stamp_ns {
                 0 => topic.unstamped = true,
-                _ => topic.delays_ns.push(log_time_ns(message) - stamp_ns),
+                _ => topic.delays_ns.push((log_ns, log_ns - stamp_ns)),
             }
-        }
-        let time_ns = time_ns(stamp_ns, message, clock);
-        let latest = self.topics.get_mut(message.topic).map(|topic| &mut topic.latest_ns);
-        if let Some(latest) = latest.map(|latest| latest.get_or_insert(time_ns)) {
-            if time_ns < *latest - SET_BACK_NS {
-                self.twice.push(time_ns..*latest);
-            }
-            *latest = time_ns.max(*latest);
+            topic.written.note(log_ns);
         }
         time_ns
     }
 
     /// Leaves out what was recorded in times that were there twice: nobody knows which picture belongs to which joints.
     fn leave_out_what_was_twice(&mut self) {
-        let Some(longest) = self.twice.iter().map(|t| t.end - t.start).max() else { return };
-        let once = |time: i64| !self.twice.iter().any(|t| (t.start..=t.end).contains(&time));
+        if self.topics.values().any(|topic| topic.written.in_no_order()) {
+            // The file says nothing of the order in which its messages came.
+            return;
+        }
+        let of_joints = self.joints.values().flat_map(|samples| twice(samples.iter().map(|s| s.time_ns)));
+        let of_images = self.images.values().flat_map(|times| twice(times.iter().copied()));
+        let twice: Vec<Range<i64>> = of_joints.chain(of_images).collect();
+        let Some(longest) = twice.iter().map(|t| t.end - t.start).max() else { return };
+        let once = |time: i64| !twice.iter().any(|t| (t.start..=t.end).contains(&time));
         self.joints.values_mut().for_each(|samples| samples.retain(|s| once(s.time_ns)));
         self.images.values_mut().for_each(|times| times.retain(|t| once(*t)));
         let what =
@@ -359,14 +356,16 @@ impl Scan {
     /// Median time from stamp to recording over some topics, s.
     pub fn delay_s(&self, topics: &[String]) -> f64 {
         let all = topics.iter().filter_map(|topic| self.topics.get(topic));
-        median_s(all.flat_map(|topic| topic.delays_ns.iter().copied()).collect())
+        median_s(all.flat_map(|topic| topic.delays_ns.iter().map(|(_, delay)| *delay)).collect())
     }
 
     /// By how much more the time from stamp to recording is over the last quarter of the messages of a topic than over the first, s.
     pub fn delay_growth_s(&self, topic: &str) -> f64 {
-        let delays = self.topics.get(topic).map_or(&[][..], |topic| &topic.delays_ns);
+        let mut delays = self.topics.get(topic).map_or(Vec::new(), |topic| topic.delays_ns.clone());
+        delays.sort_by_key(|(log_ns, _)| *log_ns);
+        let of = |some: &[(i64, i64)]| median_s(some.iter().map(|(_, delay)| *delay).collect());
         let quarter = delays.len() / 4;
-        median_s(delays[delays.len() - quarter..].to_vec()) - median_s(delays[..quarter].to_vec())
+        of(&delays[delays.len() - quarter..]) - of(&delays[..quarter])
     }
 }
 
