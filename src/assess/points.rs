@@ -29,15 +29,28 @@ pub struct PointFit {
     pub rms_m: f64,
 }
 
+/// Share of their mean by which the normal equations are held where the points do not determine frame and reflector.
+const HELD: f64 = 1e-9;
+
 /// Least squares over the base frame and the reflector point; `None` where the points do not determine them.
 pub fn fit_points(robot: &Robot, points: &[MeasuredPoint]) -> Option<PointFit> {
+    fit(robot, points, 0.0)
+}
+
+/// The same where only the residuals matter: of an arm whose axes are all parallel no points tell how much of a shift along them
+/// is one of the base, and how much one of the tip.
+pub(super) fn lay_over(robot: &Robot, points: &[MeasuredPoint]) -> Option<PointFit> {
+    fit_points(robot, points).or_else(|| fit(robot, points, HELD))
+}
+
+fn fit(robot: &Robot, points: &[MeasuredPoint], held: f64) -> Option<PointFit> {
     let tips: Vec<Pose> = points.iter().map(|p| robot.base_from_tip(&p.readings)).collect();
     let mut best: Option<PointFit> = None;
     // The problem is not convex: the frame is started from the best rigid fit for several reflector positions.
     for start in
         [Vector3::zeros(), Vector3::new(0.0, 0.0, 0.2), Vector3::new(0.1, 0.0, 0.1), Vector3::new(-0.1, 0.1, 0.1)]
     {
-        let Some(fit) = from_start(&tips, points, start) else { continue };
+        let Some(fit) = from_start(&tips, points, start, held) else { continue };
         if best.as_ref().is_none_or(|b| fit.rms_m < b.rms_m) {
             best = Some(fit);
         }
@@ -45,7 +58,7 @@ pub fn fit_points(robot: &Robot, points: &[MeasuredPoint]) -> Option<PointFit> {
     best
 }
 
-fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>) -> Option<PointFit> {
+fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>, held: f64) -> Option<PointFit> {
     let mut tip_point = start;
     let pairs = tips.iter().zip(points).map(|(tip, p)| (tip.transform(&start), p.position_m));
     let mut frame = rigid_fit(&pairs.collect::<Vec<_>>())?;
@@ -58,6 +71,8 @@ fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>) -> O
             n += j.transpose() * j;
             b += j.transpose() * r;
         }
+        let scale = n.diagonal().mean();
+        (0..9).for_each(|k| n[(k, k)] += held * scale);
         let step = SymmetricFactor::new(&n).ok()?.solve(&b);
         frame = frame.perturbed(&step.fixed_rows::<6>(0).into_owned());
         tip_point += Vector3::new(step[6], step[7], step[8]);

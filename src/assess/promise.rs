@@ -9,7 +9,7 @@ use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use super::flange::FlangeModel;
-use super::points::{MeasuredPoint, PointFit, fit_points};
+use super::points::{MeasuredPoint, PointFit, lay_over};
 use super::root_mean_square;
 use crate::model::joint_terms::Term;
 use crate::model::robot::{Posture, Robot};
@@ -90,11 +90,11 @@ impl FlangeErrors {
     }
 }
 
-/// The nominal robot over a corrected one at samples, with the base and the tool that fit best; `None` where they do not determine these.
+/// The nominal robot over a corrected one at samples, with a base and a tool that fit best; `None` where none can be found.
 pub(super) fn nominal_laid_over(corrected: &Robot, samples: &[Posture]) -> Option<PointFit> {
     let point =
         |s: &Posture| MeasuredPoint { position_m: exact(corrected, s).translation, readings: s.readings.clone() };
-    fit_points(&Robot::nominal(corrected.chain.clone()), &samples.iter().map(point).collect::<Vec<_>>())
+    lay_over(&Robot::nominal(corrected.chain.clone()), &samples.iter().map(point).collect::<Vec<_>>())
 }
 
 /// The robot with some of its terms.
@@ -133,4 +133,48 @@ pub fn usual_joint_sigma(of_stops: &[Vec<f64>]) -> Vec<f64> {
     let readings = of_stops.first().map_or(0, Vec::len);
     let of = |r: usize| root_mean_square(&of_stops.iter().map(|s| (s[r] * s[r], 1.0)).collect::<Vec<_>>());
     (0..readings).map(of).collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::assess::stops::halton_stops;
+    use crate::urdf::RobotDescription;
+
+    /// An arm whose axes are all vertical: two turns, a stroke, a turn.
+    fn scara() -> Robot {
+        let joint = |(name, kind, from, to, xyz): (&str, &str, &str, &str, &str)| {
+            format!(
+                "<joint name='{name}' type='{kind}'><parent link='{from}'/><child link='{to}'/><origin xyz='{xyz}'/>\
+                 <axis xyz='0 0 1'/><limit lower='-3' upper='3' effort='0' velocity='0'/></joint>"
+            )
+        };
+        let rows = [
+            ("j1", "revolute", "base", "a", "0 0 0.4"),
+            ("j2", "revolute", "a", "b", "0.3 0 0"),
+            ("j3", "prismatic", "b", "c", "0.3 0 0"),
+            ("j4", "revolute", "c", "d", "0 0 0"),
+        ];
+        let links: String = ["base", "a", "b", "c", "d"].iter().map(|l| format!("<link name='{l}'/>")).collect();
+        let text = format!("<robot name='r'>{links}{}</robot>", rows.map(joint).concat());
+        Robot::nominal(RobotDescription::from_text(Path::new("r.urdf"), text).unwrap().chain(None, None).unwrap())
+    }
+
+    #[test]
+    fn an_arm_whose_axes_are_all_parallel_has_an_error_of_the_nominal_robot() {
+        let mut robot = scara();
+        let samples = halton_stops(&[(-2.5, 2.5), (-2.5, 2.5), (-0.1, 0.3), (-3.0, 3.0)], 100);
+        assert!(nominal_laid_over(&robot, &samples).unwrap().rms_m < 1e-9);
+        // The first link is 1 mm longer: base and tool take up a part of it.
+        robot.twists[1][0] = 1e-3;
+        let rms_m = nominal_laid_over(&robot, &samples).unwrap().rms_m;
+        assert!((1e-4..1e-3).contains(&rms_m), "{rms_m:e} m");
+        // A shift along the axes is one of base or tool.
+        robot.twists[1][0] = 0.0;
+        robot.twists[2][2] = 1e-3;
+        assert!(nominal_laid_over(&robot, &samples).unwrap().rms_m < 1e-9);
+    }
 }

@@ -9,7 +9,6 @@ use super::parts::parts_of;
 use super::records;
 use super::sqlite;
 use crate::error::{Code, Error, Notice, Result, plain_name};
-use crate::files::{self, FileKind};
 
 /// Refuses other kinds of recordings, with the command that converts them.
 ///
