@@ -8,7 +8,9 @@ use super::parts::parts_of;
 #[cfg(feature = "mcap")]
 use super::records;
 use super::sqlite;
-use crate::error::{Code, Error, Notice, Result, plain_name};
+#[cfg(not(feature = "mcap"))]
+use crate::error::{Code, Error};
+use crate::error::{Notice, Result, plain_name};
 
 /// Refuses other kinds of recordings, with the command that converts them.
 ///
