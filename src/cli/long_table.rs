@@ -3,10 +3,12 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
+use super::summary::{in_words, with_remedy};
 use crate::assess::{Cause, Errors, Identifiability, UnknownDirection, median};
 use crate::error::Notice;
 use crate::identify::{Comparison, Estimator, LensEvidence};
 use crate::output::solution_json::{EstimateRecord, PlateRecord, SolutionRecord};
+use crate::output::verdict::{Trust, Verdict};
 use crate::problem::{OriginPrior, short_name};
 use crate::urdf::JointKind;
 
@@ -123,12 +125,13 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 }
 
 fn verdict(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    if r.failed_gates.is_empty() {
-        writeln!(out, "verdict   good")
-    } else {
-        writeln!(out, "verdict   NOT TO BE TRUSTED:")?;
-        r.failed_gates.iter().try_for_each(|g| writeln!(out, "          - {g}"))
-    }
+    let verdict = Verdict::of(r);
+    writeln!(out, "verdict   {}", in_words(&verdict))?;
+    let reasons = match verdict.trust {
+        Trust::Failed => r.failed_gates.clone(),
+        _ => verdict.reasons.iter().map(with_remedy).collect(),
+    };
+    reasons.iter().try_for_each(|reason| writeln!(out, "          - {reason}"))
 }
 
 /// What may be promised of the corrected robot: by model and covariance.

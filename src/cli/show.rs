@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::files::{self, FileKind};
 use crate::output::difference::{Difference, compare_solutions};
 use crate::output::solution_json::{self, SolutionRecord};
+use crate::output::verdict;
 use crate::output::{Thumbnails, figure_files, recover, report_html, write_beside};
 use crate::urdf::JointKind;
 
@@ -107,14 +108,11 @@ fn compare(args: &ShowArgs, a: &SolutionRecord, b: &SolutionRecord) -> Result<Ve
     for (name, x, y, sigmas) in &found.parameters {
         say_line!("differ    {name}: {x:.3e} and {y:.3e}, {sigmas:.1} sigmas");
     }
+    let words = |r: &SolutionRecord| summary::in_words(&verdict::Verdict::of(r));
     for (what, r) in [("first", a), ("second", b)] {
-        say_line!("accuracy  {what}: {:.3} mm held out ({})", r.accuracy.calibrated.rms_mm, verdict(r));
+        say_line!("accuracy  {what}: {:.3} mm held out ({})", r.accuracy.calibrated.rms_mm, words(r));
     }
     Ok(Verdict::Good)
-}
-
-fn verdict(r: &SolutionRecord) -> &'static str {
-    if r.failed_gates.is_empty() { "good" } else { "NOT TO BE TRUSTED" }
 }
 
 fn print_difference(region: &str, d: &Difference, a: &SolutionRecord) {

@@ -47,23 +47,33 @@ pub(super) fn text(record: &SolutionRecord, folder: &Path) -> String {
 }
 
 fn headline(verdict: &Verdict) -> String {
+    format!("verdict   {}", in_words(verdict))
+}
+
+/// May it be used? In a few words.
+pub(super) fn in_words(verdict: &Verdict) -> String {
     let count = verdict.reasons.len();
     match verdict.trust {
-        Trust::Good => "verdict   good".into(),
-        Trust::Doubts if count == 1 => "verdict   good, with one doubt".into(),
-        Trust::Doubts => format!("verdict   good, with {count} doubts"),
-        Trust::Failed if count == 1 => "verdict   NOT TO BE TRUSTED: a check failed".into(),
-        Trust::Failed => format!("verdict   NOT TO BE TRUSTED: {count} checks failed"),
+        Trust::Good => "good".into(),
+        Trust::Doubts if count == 1 => "good, with one doubt".into(),
+        Trust::Doubts => format!("good, with {count} doubts"),
+        Trust::Failed if count == 1 => "NOT TO BE TRUSTED: a check failed".into(),
+        Trust::Failed => format!("NOT TO BE TRUSTED: {count} checks failed"),
     }
 }
 
 /// What was found; of a failed result the remedies stand under "next".
 fn reasons(verdict: &Verdict, most: usize) -> Vec<String> {
-    let words = |r: &VerdictReason| match verdict.trust == Trust::Failed || r.remedy.is_empty() {
-        true => r.what.clone(),
-        false => format!("{} ({})", r.what, r.remedy),
-    };
+    let words = |r: &VerdictReason| if verdict.trust == Trust::Failed { r.what.clone() } else { with_remedy(r) };
     shared("          - ", &verdict.reasons.iter().map(words).collect::<Vec<_>>(), most)
+}
+
+/// What was found, and what to do about it.
+pub(super) fn with_remedy(reason: &VerdictReason) -> String {
+    match reason.remedy.as_str() {
+        "" => reason.what.clone(),
+        remedy => format!("{} ({remedy})", reason.what),
+    }
 }
 
 /// Lines of what asks for a look: one for each at least, as many as they need where a line is left for what to do next.

@@ -537,3 +537,27 @@ fn a_joint_noise_stated_too_small_is_to_be_left_out() {
     assert_eq!(output.status.code(), Some(3), "{said}");
     assert!(said.starts_with("error[nothing_held_out]: ") && said.contains("--joint-noise"), "{said}");
 }
+
+/// `show` and `show --all` say the same of a result, and why.
+#[test]
+fn the_long_table_has_the_verdict_of_the_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut record: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(root("reports/kr6_small/solution.json")).unwrap()).unwrap();
+    let doubts = ["urdf_mass_placeholder", "recording_damaged"];
+    for count in 0..=doubts.len() {
+        let notice = |code: &&str| serde_json::json!({"code": code, "place": "p", "what": *code, "remedy": "r"});
+        record["notices"] = doubts[..count].iter().map(notice).collect();
+        let path = folder.path().join("solution.json");
+        std::fs::write(&path, serde_json::to_vec(&record).unwrap()).unwrap();
+        let of = |args: &[&str]| {
+            let output = robotcal(&[&["show", path.to_str().unwrap()], args].concat());
+            assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+            String::from_utf8_lossy(&output.stdout).into_owned()
+        };
+        let (short, long) = (of(&[]), of(&["--all"]));
+        assert_eq!(short.lines().next(), long.lines().next());
+        let reasons = long.lines().skip(1).take_while(|l| l.trim_start().starts_with("- ")).count();
+        assert_eq!(reasons, count, "{long}");
+    }
+}
