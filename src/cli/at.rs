@@ -11,6 +11,7 @@ use crate::output::flange_table::{at_csv, flange_at};
 use crate::output::restore::found_model;
 use crate::output::solution_json::SolutionRecord;
 use crate::output::write_beside;
+use crate::urdf::Chain;
 
 /// Flags of `--at`.
 #[derive(Debug, Args)]
@@ -27,20 +28,47 @@ pub(super) struct AtArgs {
 /// Most rows that are printed.
 const MOST_ROWS: usize = 20;
 
+/// The joint vectors of `--at`, rad or m.
+pub(super) struct AtTable<'a> {
+    file: &'a Path,
+    readings: Vec<Vec<f64>>,
+}
+
 impl AtArgs {
-    /// Predicts, writes at.csv into `folder` and says what it holds; nothing without `--at`.
+    /// The table, read before the work whose result it asks; nothing without `--at`.
     ///
     /// # Errors
-    /// A table that cannot be read, a solution that does not tie robot and plate, a file that cannot be written.
+    /// A table that cannot be read, or without the joints of the chain.
+    pub(super) fn table(&self, chain: &Chain) -> Result<Option<AtTable<'_>>> {
+        let (Some(file), Some(unit)) = (&self.at, self.at_unit) else { return Ok(None) };
+        let rows = joint_table::read(file, &[], chain, (unit, "--at-unit"))?;
+        Ok(Some(AtTable { file, readings: rows.into_iter().map(|(_, q)| q).collect() }))
+    }
+
+    /// The same for a solution, whose chain is put together for it.
+    ///
+    /// # Errors
+    /// As of [`AtArgs::table`]; a solution that does not hang together.
+    pub(super) fn table_for(&self, record: &SolutionRecord) -> Result<Option<AtTable<'_>>> {
+        match self.at {
+            Some(_) => self.table(&found_model(record)?.robot.chain),
+            None => Ok(None),
+        }
+    }
+}
+
+impl AtTable<'_> {
+    /// Predicts, writes at.csv into `folder` and says what it holds.
+    ///
+    /// # Errors
+    /// A solution that does not tie robot and plate, a file that cannot be written.
     pub(super) fn run(&self, record: &SolutionRecord, folder: &Path) -> Result<String> {
-        let (Some(file), Some(unit)) = (&self.at, self.at_unit) else { return Ok(String::new()) };
+        let Self { file, readings } = self;
         let model = found_model(record)?;
-        let rows = joint_table::read(file, &[], &model.robot.chain, (unit, "--at-unit"))?;
-        let readings: Vec<Vec<f64>> = rows.into_iter().map(|(_, q)| q).collect();
-        let found = flange_at(&model, &readings)?;
+        let found = flange_at(&model, readings)?;
         let path = folder.join("at.csv");
-        let table = at_csv(&model, &readings, &found);
-        write_beside(folder, &[("at.csv".to_owned(), table.as_bytes())], std::slice::from_ref(file))?;
+        let table = at_csv(&model, readings, &found);
+        write_beside(folder, &[("at.csv".to_owned(), table.as_bytes())], &[file.to_path_buf()])?;
         let mut out = String::new();
         for (k, f) in found.iter().enumerate().take(MOST_ROWS) {
             let [position, rotation] = f.sigmas();

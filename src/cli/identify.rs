@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::at::AtArgs;
+use super::at::{AtArgs, AtTable};
 use super::camera_args::CameraArgs;
 use super::choices::ChoiceArgs;
 use super::recording::RecordingArgs;
@@ -120,6 +120,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let earlier = args.from.as_deref().map(read_solution).transpose()?;
     let options = args.choices.options(earlier.as_ref().map_or_else(Options::default, restore::options))?;
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
+    let mut at = None;
     let mut observed = match (earlier.as_ref().zip(args.from.as_deref()), &args.urdf) {
         (Some((record, path)), _) => Observed::of_record(record, path, ends)?,
         (None, urdf) => {
@@ -131,6 +132,9 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
                 let names: Vec<String> = inputs.series.iter().map(|s| s.name.clone()).collect();
                 place = Some(claim(&Path::new("reports").join(folder_name(&names)))?);
             }
+            if !args.dry_run {
+                at = args.at.table(&inputs.chain)?;
+            }
             let inputs = inputs.with_recordings(&args.recording.options(&[])?)?;
             if args.dry_run {
                 inputs.tip_notice.iter().for_each(|notice| say_line!("note      {}", notice.coded()));
@@ -140,6 +144,9 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
             inputs.observe(&progress::of_series())?
         }
     };
+    if at.is_none() {
+        at = args.at.table(&observed.chain)?;
+    }
     let place = place.ok_or_else(|| {
         Error::new(Code::OptionMissing, "identify", "no folder for the results is given", "give --out")
     })?;
@@ -150,10 +157,15 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
     // A refusal says nothing of what was noticed before, which may be its cause.
     let calibration = Calibration::of(observed, &Options { estimator, ..options })
         .inspect_err(|_| noticed.iter().for_each(|notice| tracing::warn!("{}", notice.coded())))?;
-    write(args, calibration, place)
+    write(args, calibration, place, at.as_ref())
 }
 
-fn write(args: &IdentifyArgs, calibration: Calibration, place: ResultFolder) -> Result<Verdict> {
+fn write(
+    args: &IdentifyArgs,
+    calibration: Calibration,
+    place: ResultFolder,
+    at: Option<&AtTable<'_>>,
+) -> Result<Verdict> {
     let poses = if args.poses { Poses::Written } else { Poses::LeftOut };
     let command = super::command_line().join(" ");
     let folder = place.path().to_path_buf();
@@ -168,12 +180,15 @@ fn write(args: &IdentifyArgs, calibration: Calibration, place: ResultFolder) -> 
     let record = read_solution(&folder)?;
     match (args.json, stages::are_told()) {
         (true, _) => say!("{}", files::read_text(&folder.join(FILE_NAME), FileKind::Solution)?),
-        (_, true) => {
-            say!("{}{}", long_table::text(&record), args.at.run(&record, &folder)?);
-            // The times of the stages go with the result.
-            say_line!("results   {} ({} files)", folder.display(), record.files.len() + 1);
-        }
-        _ => say!("{}{}", summary::text(&record, &folder), args.at.run(&record, &folder)?),
+        (_, true) => say!("{}", long_table::text(&record)),
+        _ => say!("{}", summary::text(&record, &folder)),
+    }
+    if let Some(at) = at {
+        say!("{}", at.run(&record, &folder)?);
+    }
+    if stages::are_told() && !args.json {
+        // The times of the stages go with the result.
+        say_line!("results   {} ({} files)", folder.display(), record.files.len() + 1);
     }
     Ok(if record.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }

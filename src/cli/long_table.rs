@@ -231,7 +231,9 @@ fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
             })
             .collect();
         let of = if all.len() > 1 { format!(" ({name})") } else { String::new() };
-        let tilt = Some(noise.apparent_tilt_rad).filter(|t| *t > 0.0);
+        let saw_no_plate =
+            r.series.iter().any(|s| s.name == *name) && r.images.iter().all(|image| image.series != *name);
+        let tilt = Some(noise.apparent_tilt_rad).filter(|t| *t > 0.0 && !saw_no_plate);
         let tilt = tilt.map(|t| format!("; apparent tilt of the plate {:.3}", 1e3 * t));
         let shift = noise.apparent_shift.map(|shift| {
             let [spin, across, along] = [shift.spin_rad, shift.across_m, shift.along_m].map(|size| 1e3 * size);

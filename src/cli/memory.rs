@@ -38,13 +38,22 @@ pub(super) fn in_a_child() -> Option<ExitCode> {
     Some(ExitCode::from(error.exit_code()))
 }
 
-/// Number of threads: that of the user; where memory is short only the present one.
+/// Threads for every core that serve any purpose.
+const MOST_FOR_A_CORE: usize = 4;
+
+/// No more threads than the cores have work for: thousands of them would only wait for each other.
+fn capped(wanted: usize, cores: usize) -> usize {
+    wanted.min(MOST_FOR_A_CORE * cores)
+}
+
+/// Number of threads: that of the user, up to [`MOST_FOR_A_CORE`]; where memory is short only the present one.
 pub(super) fn set_threads(wanted: Option<usize>) {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let pool = rayon::ThreadPoolBuilder::new();
     // Fails only where a pool exists already, which then serves as well.
     let _ = match (std::env::var(CHILD).is_ok_and(|c| c == ONE_THREAD), wanted) {
         (true, _) => pool.num_threads(1).use_current_thread().build_global(),
-        (false, Some(threads)) => pool.num_threads(threads).build_global(),
+        (false, Some(threads)) => pool.num_threads(capped(threads, cores)).build_global(),
         (false, None) => Ok(()),
     };
 }
@@ -70,4 +79,15 @@ fn lacked_memory(ended: ExitStatus) -> bool {
 #[cfg(not(unix))]
 fn lacked_memory(_: ExitStatus) -> bool {
     false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::capped;
+
+    #[test]
+    fn a_core_gets_four_threads_at_most() {
+        assert_eq!([1, 8, 9, 5000].map(|wanted| capped(wanted, 2)), [1, 8, 8, 8]);
+        assert_eq!(capped(0, 2), 0, "all cores");
+    }
 }

@@ -72,7 +72,7 @@ struct Cli {
     /// Show no progress
     #[arg(short, long, global = true, help_heading = "Everywhere")]
     quiet: bool,
-    /// Threads for images (default: all cores); the result does not depend on it
+    /// Threads for images (default: all cores; at most four for each core); the result does not depend on it
     #[arg(long, global = true, value_name = "N", help_heading = "Everywhere")]
     threads: Option<usize>,
     #[command(subcommand)]

@@ -58,6 +58,7 @@ pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {
     if let Some(second) = args.solutions.get(1) {
         return compare(args, &first, &read_solution(second)?);
     }
+    let at = args.at.table_for(&first)?;
     if let Some(file) = &args.report {
         let page = report_html(&first, &Thumbnails::of_files(first.photogrammetry()));
         let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
@@ -82,7 +83,9 @@ pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {
     if args.parameters {
         say!("{}", long_table::parameters(&first));
     }
-    say!("{}", args.at.run(&first, &args.out)?);
+    if let Some(at) = at {
+        say!("{}", at.run(&first, &args.out)?);
+    }
     Ok(verdict_of(&first))
 }
 

@@ -561,3 +561,38 @@ fn the_long_table_has_the_verdict_of_the_answer() {
         assert_eq!(reasons, count, "{long}");
     }
 }
+
+/// What asks the result a question is read before the work that the result costs.
+#[test]
+fn a_table_of_readings_that_cannot_be_used_is_refused_before_the_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let (urdf, series) = (root("robots/ur10e/ur10e.urdf"), root("datasets/ur10e_observations"));
+    let [missing, bad, out] = ["missing.csv", "bad.csv", "out"].map(|name| folder.path().join(name));
+    std::fs::write(&bad, "a,b\n1,2\n").unwrap();
+    for (table, code) in [(missing, Code::FileMissing), (bad, Code::CsvColumnMissing)] {
+        let table = table.to_str().unwrap();
+        let common = ["identify", "--urdf", &urdf, "--series", &series, "--out", out.to_str().unwrap()];
+        let output = robotcal(&[&common[..], &["--at", table, "--at-unit", "deg"]].concat());
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert_says(&text(&output), code, &[table]);
+        assert!(!out.join("solution.json").exists(), "{}", text(&output));
+    }
+}
+
+#[test]
+fn more_threads_than_serve_any_purpose_are_not_started() {
+    let output = robotcal(&["--threads", "5000", "show", &root("reports/kr6_small/solution.json")]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+}
+
+/// Only images of a plate tell how it seems to be tilted.
+#[test]
+fn a_series_without_images_has_no_tilt_of_the_plate() {
+    let bytes = std::fs::read(root("reports/kr6_small/solution.json")).unwrap();
+    let mut record = robotcal::output::solution_json::read(&bytes).unwrap();
+    let joints = |said: String| said.lines().find(|l| l.starts_with("joints")).unwrap().to_owned();
+    // words: the line has no other word for what is not there.
+    assert!(joints(robotcal::cli::summary_of(&record)).contains("tilt"));
+    record.series[0].name = "tracker".into();
+    assert!(!joints(robotcal::cli::summary_of(&record)).contains("tilt"));
+}
