@@ -29,6 +29,9 @@ use crate::urdf::Chain;
 
 const IMAGE_EXTENSIONS: [&str; 9] = ["png", "tif", "tiff", "pgm", "pnm", "ppm", "jpg", "jpeg", "bmp"];
 
+/// What to do with images of other formats.
+const CONVERT: &str = "convert the images to png, tif, pgm, jpg or bmp, and name them so in the table";
+
 /// Where the image points come from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Source {
@@ -318,6 +321,7 @@ fn pictured(
 ) -> Result<Source> {
     let on_disk = image_files(images)?;
     let names: BTreeSet<String> = on_disk.iter().map(|p| file_name(p)).collect();
+    let others = other_files(images, &names)?;
     let mut missing = Vec::new();
     let composed: BTreeMap<String, &String> = names.iter().map(|name| (name.nfc().collect(), name)).collect();
     for stop in &mut stops.stops {
@@ -331,16 +335,25 @@ fn pictured(
         }
     }
     for (stop, line) in stops.stops.iter_mut().zip(lines) {
-        if names.contains(&stop.image) {
+        // What is no image by its name is looked at like one: what is wrong with it is said of it then.
+        if names.contains(&stop.image) || others.contains(&stop.image) {
             stop.path = Some(images.join(&stop.image));
         } else {
             missing.push((*line, stop.image.clone()));
         }
     }
-    let remedy = |name: &str| match similar(name, &names) {
-        Some(there) => format!("\"{there}\" is there: write the name exactly"),
-        None => "copy the image or remove the row".to_string(),
+    let remedy = |name: &str| match (similar(name, &names), similar(name, &others)) {
+        (Some(there), _) => format!("\"{there}\" is there: write the name exactly"),
+        (None, Some(there)) => format!("\"{there}\" is there, and its format is not read: {CONVERT}"),
+        (None, None) => "copy the image or remove the row".to_string(),
     };
+    let unread = |(stop, _): &(&SeriesStop, &u64)| others.contains(&stop.image);
+    let of_unread: Vec<(&SeriesStop, &u64)> = stops.stops.iter().zip(lines).filter(unread).collect();
+    if let Some((stop, line)) = of_unread.first().filter(|_| 2 * of_unread.len() > stops.stops.len()) {
+        let (count, all) = (of_unread.len(), stops.stops.len());
+        let what = format!("image \"{}\" is of a format that is not read ({count} of {all} images)", stop.image);
+        return Err(Error::new(Code::ImageUnreadable, format!("{}:{line}", csv.display()), what, CONVERT));
+    }
     // Some images lost among many are left out by name; most images lost is a wrong folder or wrong names.
     if let Some((line, name)) = missing.first().filter(|_| 2 * missing.len() > stops.stops.len()) {
         let what = format!(
@@ -403,6 +416,14 @@ pub(super) fn image_files(folder: &Path) -> Result<Vec<PathBuf>> {
     }
     files.sort();
     Ok(files)
+}
+
+/// Names of the files of a folder that are no images by their names.
+fn other_files(folder: &Path, images: &BTreeSet<String>) -> Result<BTreeSet<String>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, &e))?;
+    let paths = entries.map(|entry| entry.map(|e| e.path()).map_err(|e| Error::io(folder, &e)));
+    let paths = paths.collect::<Result<Vec<PathBuf>>>()?;
+    Ok(paths.iter().filter(|p| p.is_file()).map(|p| file_name(p)).filter(|name| !images.contains(name)).collect())
 }
 
 /// Last part of a path.

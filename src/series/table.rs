@@ -107,6 +107,11 @@ impl Table {
             return self.check_headers();
         }
         if record.len() != self.headers.len() {
+            let remark = [(1, self.headers.first().map(String::as_str)), (line, record.get(0))];
+            if let Some((line, _)) = remark.into_iter().find(|(_, cell)| cell.is_some_and(|c| c.starts_with('#'))) {
+                let remedy = "remove the line: the first one names the columns, every other one is a row";
+                return Err(Error::new(Code::CsvSyntax, self.place_of_line(line), "is a remark (#)", remedy));
+            }
             let what = format!("{} cells under {} column names", record.len(), self.headers.len());
             let remedy = "give every row all cells; numbers need a decimal point, not a comma";
             return Err(Error::new(Code::CsvCellCount, self.place_of_line(line), what, remedy));

@@ -173,6 +173,30 @@ fn images_and_rows_are_held_against_each_other() {
     assert_says(&message, Code::ImageNotThere, &["\"a.png\""]);
 }
 
+/// A file that is there and whose format is not read is not missing.
+#[test]
+fn images_of_other_formats_are_not_taken_for_missing_ones() {
+    let webp = [("images/a.webp", ""), ("images/b.webp", "")];
+    let of = |joints: &str| [&webp[..], &[("joints.csv", joints)]].concat();
+    let message = refusal(&of(&JOINTS.replace("a.png", "a.webp").replace("b.png", "b.webp")));
+    assert_says(&message, Code::ImageUnreadable, &["joints.csv:2", "a.webp", "2 of 3"]);
+    // One of them is left out when it is looked at, and says itself why.
+    let series = read(series_with(&of(&JOINTS.replace("a.png", "a.webp"))).path()).unwrap();
+    assert!(series.stops.stops[0].path.as_ref().unwrap().ends_with("images/a.webp"));
+    assert!(series.notices.iter().all(|n| n.code == Code::ImageUnlisted), "{:?}", series.notices);
+    // Named by its stop, without the end of its name.
+    let message = refusal(&[("images/c.webp", ""), ("joints.csv", "image,j1,j2,x\nc,0.1,1.25,0.5\n")]);
+    assert_says(&message, Code::ImageNotThere, &["joints.csv:2", "\"c.webp\""]);
+}
+
+#[test]
+fn remarks_in_a_table_are_named() {
+    for (joints, line) in [(format!("# mine\n{JOINTS}"), "joints.csv:1"), (format!("{JOINTS}# end\n"), "joints.csv:5")]
+    {
+        assert_says(&refusal(&[("joints.csv", &joints)]), Code::CsvSyntax, &[line]);
+    }
+}
+
 #[test]
 fn readings_are_matched_by_name_in_si() {
     let chain = chain();
