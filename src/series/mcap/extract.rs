@@ -17,6 +17,8 @@ use crate::series::{InputFile, Stops};
 const MOST_PICTURES: usize = 9;
 /// The ends of a standstill are left out where it is long enough, ns: stamps of image and joints may differ a little.
 const MARGIN_NS: i64 = 50_000_000;
+/// A robot that is slow for less than this need not have stopped, ns.
+const LEAST_SEEN_NS: i64 = 100_000_000;
 /// Delays of images and joints that differ by more deserve a look, s.
 const NOTABLE_DELAY_S: f64 = 0.05;
 
@@ -106,10 +108,9 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         ));
     }
     if growth_s.abs() > NOTABLE_DELAY_S {
-        let sign = if growth_s < 0.0 { "earlier" } else { "later" };
         let what = format!(
-            "images arrive {:.3} s {sign} after their stamp at the end than at the beginning, joint states do not: the clocks of camera and robot run apart",
-            growth_s.abs()
+            "images take {} from stamp to arrival at the end than at the beginning, joint states do not: the clocks of camera and robot run apart",
+            difference(growth_s)
         );
         let remedy = "use the times of recording (--clock log), or let one clock stamp both";
         notices.push(Notice::new(Code::ClocksApart, recording.display(), what, remedy));
@@ -139,8 +140,11 @@ const OTHER_CLOCK: &str =
     "state the delay (--image-delay 0 where the stamps are right), or take the times of recording (--clock log)";
 
 fn delayed(image_delay_s: f64) -> String {
-    let sign = if image_delay_s < 0.0 { "earlier" } else { "later" };
-    format!("images arrive {:.3} s {sign} after their stamp than joint states", image_delay_s.abs())
+    format!("images take {} from stamp to arrival than joint states", difference(image_delay_s))
+}
+
+fn difference(s: f64) -> String {
+    format!("{:.3} s {}", s.abs(), if s < 0.0 { "less" } else { "more" })
 }
 
 fn nanoseconds(s: f64) -> i64 {
@@ -278,6 +282,10 @@ fn groups(
             "wait longer at each stop, or check the stamps of the images",
         ));
     }
+    let short = short(postures, times, options);
+    if options.motion == Motion::Refuse && short > groups.len() && !groups.is_empty() {
+        scan.notices.push(too_short(&place, short, options));
+    }
     if groups.is_empty() && open != 0 && !still.is_empty() {
         let what = format!(
             "{}, and the robot stands for less at each of the {} stops: nobody knows which image is of which stop",
@@ -287,13 +295,34 @@ fn groups(
         return Err(Error::new(Code::ClocksApart, &place, what, OTHER_CLOCK));
     }
     if groups.is_empty() {
-        return Err(no_stop(&place, postures, still.len(), options));
+        return Err(no_stop(&place, postures, [still.len(), short], options));
     }
     Ok(groups)
 }
 
+/// Standstills that are shorter than what counts as one, with images.
+fn short(postures: &[Posture], times: &[i64], options: &RecordingOptions) -> usize {
+    let least_ns = nanoseconds(options.least_still_s);
+    let all = standstills(postures, options.still_speed, LEAST_SEEN_NS.min(least_ns));
+    let has_image = |s: &&Standstill| times.iter().any(|t| (s.from_ns..=s.to_ns).contains(t));
+    all.iter().filter(|s| s.to_ns - s.from_ns < least_ns).filter(has_image).count()
+}
+
+/// The robot stopped, and not for long enough.
+fn too_short(place: &str, count: usize, options: &RecordingOptions) -> Notice {
+    let least_s = options.least_still_s;
+    let what = format!(
+        "the robot stands for less than {least_s} s at {count} places where images were taken: this counts as no stop"
+    );
+    Notice::new(Code::RobotNeverStill, place, what, "let the robot stand for longer at each stop")
+}
+
 /// Why there is no stop at all.
-fn no_stop(place: &str, postures: &[Posture], standstills: usize, options: &RecordingOptions) -> Error {
+fn no_stop(place: &str, postures: &[Posture], [standstills, short]: [usize; 2], options: &RecordingOptions) -> Error {
+    if standstills > 0 && short > 0 {
+        let Notice { code, place, what, remedy } = too_short(place, short, options);
+        return Error::new(code, place, what, remedy);
+    }
     if standstills > 0 {
         let what = format!("none of its images was taken in one of the {standstills} standstills of the robot");
         return Error::new(
@@ -306,8 +335,9 @@ fn no_stop(place: &str, postures: &[Posture], standstills: usize, options: &Reco
     let mut steps: Vec<i64> = postures.windows(2).map(|w| w[1].time_ns - w[0].time_ns).collect();
     steps.sort_unstable();
     let step_s = steps.get(steps.len() / 2).map_or(f64::INFINITY, |ns| *ns as f64 * 1e-9);
+    let less = if short > 0 { format!("; for less it does at {short} places with images") } else { String::new() };
     let what = format!(
-        "the robot never stands still for {} s (joints slower than {} rad/s; a joint state comes every {step_s:.3} s)",
+        "the robot never stands still for {} s (joints slower than {} rad/s; a joint state comes every {step_s:.3} s){less}",
         options.least_still_s, options.still_speed
     );
     let remedy = "stop the robot for each image; images in motion are taken only on demand (--in-motion SECONDS)";

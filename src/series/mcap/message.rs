@@ -13,3 +13,11 @@ pub(super) struct Message<'a> {
     pub log_time_ns: u64,
     pub data: &'a [u8],
 }
+
+/// Where a file is damaged, and how at first.
+pub(super) fn at_places(count: u64, first: &str) -> String {
+    match count {
+        1 => format!("at one place ({first})"),
+        _ => format!("at {count} places (the first: {first})"),
+    }
+}

@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn only_times_that_come_again_are_there_twice() {
         let of = |parts: &[Vec<i64>]| twice(parts.concat().into_iter());
-        let back = |from: i64, to: i64| vec![from * 100_000_000..to * 100_000_000];
+        let back = |from: i64, to: i64| vec![Range { start: from * 100_000_000, end: to * 100_000_000 }];
         assert_eq!(of(&[tenths(0..50), tenths(47..90)]), []);
         assert_eq!(of(&[tenths(0..50), tenths(30..90)]), back(30, 49));
         assert_eq!(of(&[tenths(0..30), tenths(60..90), tenths(30..60)]), []);

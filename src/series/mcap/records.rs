@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use super::message::{MCAP, Message};
+use super::message::{MCAP, Message, at_places};
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{self, FileKind};
 
@@ -198,8 +198,7 @@ impl Contents {
             (None, None) => return None,
             (Some(end), _) => format!("is damaged or cut off ({end}); {used}"),
             (None, Some(reason)) => {
-                let places = if self.damaged == 1 { "place".into() } else { format!("{} places", self.damaged) };
-                format!("is damaged at {places} (the first: {reason}); {used}")
+                format!("is damaged {}; {used}", at_places(self.damaged, reason))
             }
         };
         Some(Notice::new(

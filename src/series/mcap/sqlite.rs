@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-use super::message::Message;
+use super::message::{Message, at_places};
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{self, FileKind};
 
@@ -83,10 +83,7 @@ impl Lost {
 
     fn notice(&self, path: &Path, given: u64, unmerged: bool) -> Option<Notice> {
         if let Some(reason) = &self.reason {
-            let what = format!(
-                "is damaged at {} places (the first: {reason}); the {given} other messages are used",
-                self.parts
-            );
+            let what = format!("is damaged {}; the {given} other messages are used", at_places(self.parts, reason));
             return Some(Notice::new(
                 Code::RecordingDamaged,
                 path.display(),

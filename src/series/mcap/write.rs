@@ -314,12 +314,12 @@ impl Recording {
 }
 
 fn refused(path: &Path, error: &mcap::McapError) -> Error {
-    Error::new(
-        Code::OutputFailed,
-        path.display(),
-        format!("cannot be written: {error}"),
-        "check that the disk is not full",
-    )
+    let why = match error {
+        mcap::McapError::Io(cause) => cause.to_string(),
+        other => other.to_string(),
+    };
+    let remedy = "check that the disk is not full";
+    Error::new(Code::OutputFailed, path.display(), format!("cannot be written: {why}"), remedy)
 }
 
 /// Seconds and nanoseconds of a stamp.
