@@ -136,7 +136,6 @@ pub fn usual_joint_sigma(of_stops: &[Vec<f64>]) -> Vec<f64> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use std::path::Path;
 

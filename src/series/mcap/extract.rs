@@ -17,8 +17,9 @@ use crate::series::{InputFile, Stops};
 const MOST_PICTURES: usize = 9;
 /// The ends of a standstill are left out where it is long enough, ns: stamps of image and joints may differ a little.
 const MARGIN_NS: i64 = 50_000_000;
-/// A robot that is slow for less than this need not have stopped, ns.
-const LEAST_SEEN_NS: i64 = 100_000_000;
+/// A robot that seems to stand for less than this need not have stopped, ns: what is seen of a standstill is shorter than it by the time
+/// over which speed is taken.
+const LEAST_SEEN_NS: i64 = 20_000_000;
 /// Delays of images and joints that differ by more deserve a look, s.
 const NOTABLE_DELAY_S: f64 = 0.05;
 
@@ -304,7 +305,7 @@ fn groups(
 fn short(postures: &[Posture], times: &[i64], options: &RecordingOptions) -> usize {
     let least_ns = nanoseconds(options.least_still_s);
     let all = standstills(postures, options.still_speed, LEAST_SEEN_NS.min(least_ns));
-    let has_image = |s: &&Standstill| times.iter().any(|t| (s.from_ns..=s.to_ns).contains(t));
+    let has_image = |s: &&Standstill| times.iter().any(|t| (s.from_ns - MARGIN_NS..=s.to_ns + MARGIN_NS).contains(t));
     all.iter().filter(|s| s.to_ns - s.from_ns < least_ns).filter(has_image).count()
 }
 
@@ -356,4 +357,42 @@ fn shrunk(standstill: Standstill) -> Standstill {
 fn spread(times: &[i64]) -> Group {
     let count = times.len().min(MOST_PICTURES);
     (0..count).map(|k| times[k * times.len() / count + times.len() / count / 2]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Joints every 10 ms and images every 50 ms of a robot that stands and moves for so many hundredths of a second.
+    fn recorded(stands_and_moves: &[(i64, bool)]) -> (Vec<Posture>, Vec<i64>) {
+        let (mut postures, mut position) = (Vec::new(), 0.0);
+        for (hundredths, moves) in stands_and_moves {
+            for _ in 0..*hundredths {
+                let time_ns = postures.len() as i64 * 10_000_000;
+                postures.push(Posture { time_ns, positions: vec![position] });
+                position += if *moves { 0.01 } else { 0.0 };
+            }
+        }
+        let times = postures.iter().step_by(5).map(|p| p.time_ns).collect();
+        (postures, times)
+    }
+
+    #[test]
+    fn standstills_that_are_too_short_are_counted() {
+        let short = [(80, true), (20, false), (80, true), (20, false), (80, true), (20, false), (80, true)];
+        let options = RecordingOptions::default();
+        let (postures, times) = recorded(&[&[(100, false)][..], &short].concat());
+        let mut scan = Scan::default();
+        assert_eq!(groups(&mut scan, &postures, &times, &options, 0).unwrap().len(), 1);
+        let told = scan.notices.iter().find(|n| n.code == Code::RobotNeverStill).unwrap();
+        assert!(told.what.contains("3 places"), "{told:?}");
+        let (postures, times) = recorded(&short);
+        let error = groups(&mut Scan::default(), &postures, &times, &options, 0).unwrap_err();
+        assert_eq!((error.code, error.what.contains("3 places")), (Code::RobotNeverStill, true), "{error}");
+    }
+
+    #[test]
+    fn a_delay_has_no_sign_in_words() {
+        assert_eq!([difference(-0.18), difference(0.18)], ["0.180 s less", "0.180 s more"]);
+    }
 }

@@ -21,3 +21,13 @@ pub(super) fn at_places(count: u64, first: &str) -> String {
         _ => format!("at {count} places (the first: {first})"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::at_places;
+
+    #[test]
+    fn one_place_is_no_first_of_several() {
+        assert_eq!([at_places(1, "x"), at_places(3, "x")], ["at one place (x)", "at 3 places (the first: x)"]);
+    }
+}

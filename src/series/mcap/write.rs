@@ -386,3 +386,15 @@ impl CdrWriter {
         self.0.push(0);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_disk_is_named_as_the_system_does() {
+        let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
+        let error = refused(Path::new("run.mcap"), &mcap::McapError::Io(std::io::Error::from(full.kind())));
+        assert!(error.code == Code::OutputFailed && error.what.ends_with(&full.to_string()), "{error}");
+    }
+}
