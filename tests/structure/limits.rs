@@ -31,6 +31,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/patterns.rs LEAST_SHARE", "rounding of an eigenvalue"),
     ("assess/patterns.rs PLATE_UNIT_M", "unit of a column"),
     ("assess/patterns.rs POWER_95", "quantile of the normal distribution"),
+    ("assess/points.rs HELD", "what the points do not tell is held by so little that it decides nothing"),
     ("assess/projection.rs ACROSS", "grid of a map"),
     ("assess/repeating.rs FEWEST", "samples of a variance"),
     ("assess/statistics.rs RESAMPLINGS", "samples of a bootstrap"),

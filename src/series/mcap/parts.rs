@@ -23,11 +23,13 @@ pub(super) struct Parts {
 /// The part of metadata.yaml that is read.
 #[derive(Deserialize)]
 struct Metadata {
+    #[serde(default)]
     rosbag2_bagfile_information: Information,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 struct Information {
+    #[serde(default)]
     relative_file_paths: Vec<String>,
 }
 
