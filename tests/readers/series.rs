@@ -176,8 +176,9 @@ fn images_and_rows_are_held_against_each_other() {
 /// A file that is there and whose format is not read is not missing.
 #[test]
 fn images_of_other_formats_are_not_taken_for_missing_ones() {
-    let webp = [("images/a.webp", ""), ("images/b.webp", "")];
-    let of = |joints: &str| [&webp[..], &[("joints.csv", joints)]].concat();
+    fn of(joints: &str) -> [(&str, &str); 3] {
+        [("images/a.webp", ""), ("images/b.webp", ""), ("joints.csv", joints)]
+    }
     let message = refusal(&of(&JOINTS.replace("a.png", "a.webp").replace("b.png", "b.webp")));
     assert_says(&message, Code::ImageUnreadable, &["joints.csv:2", "a.webp", "2 of 3"]);
     // One of them is left out when it is looked at, and says itself why.
