@@ -55,7 +55,6 @@ pub(super) fn tool_in_poses(
     let gain = 0.5 * search.equations as f64 * (none.cost / best.cost).ln();
     let sigma_m = search.sigma_m(&best)?;
     let tool_m = best.tool.fixed_rows::<3>(0).into_owned();
-    eprintln!("TOOL gain {gain} t {tool_m} s {sigma_m} c0 {} c1 {} n {}", none.cost, best.cost, search.equations);
     let is_told = gain > limits.tool_log_odds && tool_m.norm() > limits.tool_sigmas * sigma_m.norm();
     let names = series.iter().filter(|s| s.readings_are_computed()).map(|s| s.name.clone()).collect();
     is_told.then(|| ToolInPoses { series: names, tool_m: tool_m.into(), sigma_m: sigma_m.into(), gain })
