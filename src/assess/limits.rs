@@ -235,6 +235,10 @@ limits! {
     mistake_explains: f64 = 0.25;
     /// Relative error of the scale of the plate that is told from errors of the robot: nominal links are right to a percent.
     scale_error: f64 = 0.015;
+    /// Factor beyond which a plate is not mistaken for another: boards that are on sale differ by less, but for units.
+    scale_most: f64 = 3.0;
+    /// Relative distance of a scale from that of two units of length, within which it is theirs: errors of the scale by robots far from nominal.
+    scale_of_unit: f64 = 0.05;
     /// Correcting the scale must leave less than this share of the misfit.
     scale_explains: f64 = 0.6;
     /// The readings of another row are named for an image where they leave less than this share of its misfit beyond what is usual.

@@ -42,6 +42,8 @@ pub enum MistakeKind {
         below: bool,
         /// The joints of which it does, as those of a positioner that was recorded apart; empty where it is all of them.
         columns: Vec<String>,
+        /// The images of which it holds; none where it is all of them.
+        part: Option<ShiftedPart>,
     },
     /// The camera is mounted in the way that is not stated.
     Mount(CameraMount),
@@ -72,6 +74,32 @@ pub enum MistakeKind {
     },
 }
 
+/// Images one after the other that stand beside the readings of a neighbour, where others stand beside their own.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShiftedPart {
+    /// The first of them.
+    pub first: String,
+    /// The last of them.
+    pub last: String,
+    /// How many.
+    pub images: usize,
+    /// True where they go on to the last image.
+    pub to_the_end: bool,
+}
+
+impl MistakeKind {
+    /// True where `whole` is the same of all rows.
+    pub fn is_part_of(&self, whole: &Self) -> bool {
+        match (self, whole) {
+            (
+                Self::Rows { below, columns, part: Some(_) },
+                Self::Rows { below: all_below, columns: all, part: None },
+            ) => (below, columns) == (all_below, all),
+            _ => false,
+        }
+    }
+}
+
 /// A mistake that explains why readings and images do not fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mistake {
@@ -88,6 +116,14 @@ pub struct Mistake {
 }
 
 impl Mistake {
+    /// Images that it is about, where it is about some.
+    const fn part(&self) -> Option<&ShiftedPart> {
+        match &self.kind {
+            MistakeKind::Rows { part, .. } => part.as_ref(),
+            _ => None,
+        }
+    }
+
     /// Joints that it is about; none where it is about all.
     fn joints(&self) -> &[String] {
         match &self.kind {
@@ -126,6 +162,9 @@ impl Kind for Mistake {
     }
 
     fn subjects(&self) -> Vec<Subject> {
+        if let Some(ShiftedPart { first, last, .. }) = self.part() {
+            return [first, last].into_iter().cloned().map(Subject::Image).collect();
+        }
         match self.joints() {
             [] => vec![Subject::Body(self.of.clone())],
             joints => joints.iter().cloned().map(Subject::Joint).collect(),
@@ -135,6 +174,7 @@ impl Kind for Mistake {
     fn quantities(&self) -> Vec<Quantity> {
         let mut all = vec![Quantity::new("misfit", self.misfit, "rad + m")];
         all.extend(self.misfit_undone.map(|left| Quantity::new("misfit_undone", left, "rad + m")));
+        all.extend(self.part().map(|part| Quantity::new("images_shifted", part.images as f64, "1")));
         match self.kind {
             MistakeKind::Lengths { angle_rad, distance_m, .. } => {
                 all.extend([Quantity::new("angle", angle_rad, "rad"), Quantity::new("distance", distance_m, "m")]);
@@ -148,6 +188,9 @@ impl Kind for Mistake {
     }
 
     fn place(&self) -> String {
+        if let Some(ShiftedPart { first, .. }) = self.part() {
+            return first.clone();
+        }
         match self.joints() {
             [] => self.of.clone(),
             joints => joints.join(", "),
@@ -189,10 +232,14 @@ impl Kind for Mistake {
                 let word = if *is_sum { "plus" } else { "minus" };
                 format!("write {joint} {word} {before} into the column {joint} of joints.csv")
             }
+            MistakeKind::Rows { part: Some(ShiftedPart { first, last, to_the_end, .. }), .. } => format!(
+                "look for a row that was lost or written twice before {first}, and shift the names in the first column of joints.csv by one row from there on{}; of a recording, see --image-delay and --clock log",
+                if *to_the_end { String::new() } else { format!(" to {last}") }
+            ),
             MistakeKind::Rows { columns, .. } if columns.is_empty() => {
                 "shift the names in the first column of joints.csv by one row; of a recording, see --image-delay and --clock log".into()
             }
-            MistakeKind::Rows { columns, below } => format!(
+            MistakeKind::Rows { columns, below, .. } => format!(
                 "shift the columns {} of joints.csv one row {}, and see how they were recorded",
                 columns.join(", "),
                 if *below { "up" } else { "down" }
@@ -254,7 +301,14 @@ impl Mistake {
                 "the controller counts {joint} together with {before}, as where J3 is counted from the ground: with {joint} {} {before} the images fit",
                 if *is_sum { "plus" } else { "minus" }
             ),
-            MistakeKind::Rows { below, columns } => format!(
+            MistakeKind::Rows { below, part: Some(ShiftedPart { first, last, images, to_the_end }), .. } => {
+                let which = if *to_the_end { format!("from {first} on") } else { format!("from {first} to {last}") };
+                format!(
+                    "{which} images and joint readings are shifted by one row: {images} images fit the readings of the row {}, others their own",
+                    if *below { "below" } else { "above" }
+                )
+            }
+            MistakeKind::Rows { below, columns, part: None } => format!(
                 "images and {} are shifted by one row: every image fits the readings of the row {}",
                 match columns.as_slice() {
                     [] => "joint readings".to_owned(),

@@ -66,7 +66,7 @@ pub use lens_not_in_ros::LensNotInRos;
 pub use loose::LooseMounting;
 pub use marker_off::MarkerOff;
 pub use measurement_scatter::MeasurementsScatter;
-pub use mistake::{Mistake, MistakeKind};
+pub use mistake::{Mistake, MistakeKind, ShiftedPart};
 pub use moved::BodyMoved;
 pub use no_gain::NoGain;
 pub use noticed::Noticed;

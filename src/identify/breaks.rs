@@ -13,7 +13,7 @@ use crate::init::{HandEye, PosePair, SeenStop, solve_hand_eye};
 use crate::problem::MeasuredSeries;
 
 /// Parts of a series at whose ends it is divided at first.
-const PARTS: usize = 8;
+pub(super) const PARTS: usize = 8;
 
 /// Why images of one mounting and placement that miss by `misfit` do not fit.
 pub(super) fn broken(suspects: &Suspects, misfit: f64, of: &str) -> Option<Error> {

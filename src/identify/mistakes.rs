@@ -65,7 +65,7 @@ pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> 
             let mut changed = given.to_vec();
             let rows = changed.iter_mut().zip(&shifted);
             rows.for_each(|(q, of)| q[columns.clone()].copy_from_slice(&of[columns.clone()]));
-            (changed, MistakeKind::Rows { below, columns: names[columns].to_vec() })
+            (changed, MistakeKind::Rows { below, columns: names[columns].to_vec(), part: None })
         });
         let of_columns: Vec<Undone> = of_columns.collect();
         all.push((shifted, mistake));
@@ -79,6 +79,6 @@ pub(super) fn shifted_rows(given: &[Vec<f64>]) -> [Undone; 2] {
     [true, false].map(|below| {
         let mut shifted = given.to_vec();
         shifted.rotate_left(if below { 1 } else { given.len().saturating_sub(1) });
-        (shifted, MistakeKind::Rows { below, columns: Vec::new() })
+        (shifted, MistakeKind::Rows { below, columns: Vec::new(), part: None })
     })
 }

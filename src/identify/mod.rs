@@ -28,6 +28,7 @@ mod mistakes;
 mod near_nominal;
 mod options;
 mod pose_comparison;
+mod row_shift;
 mod second_pass;
 mod seen_image;
 mod selection;

@@ -23,7 +23,10 @@ pub(super) struct Suspects<'a> {
 }
 
 /// Images by which a mistake is seen to explain the misfit of all.
-const ENOUGH: usize = 100;
+pub(super) const ENOUGH: usize = 100;
+
+/// Of lengths in one another: millimetres, centimetres, metres, inches.
+const UNITS: [f64; 6] = [10.0, 100.0, 1000.0, 2.54, 25.4, 1000.0 / 25.4];
 
 impl Suspects<'_> {
     /// The mistake that, undone, fits far better than `misfit`, if there is one, and the misfit that it then leaves.
@@ -31,28 +34,41 @@ impl Suspects<'_> {
         let of_poses = self.robot.chain.pose_coordinates().is_some();
         let explains = |(left, _): &(f64, MistakeKind)| *left < self.limits.mistake_explains * misfit;
         let is_suspicious = misfit >= self.limits.suspicious_misfit;
-        let misread = || self.read_otherwise().filter(|found| is_suspicious && explains(found));
+        let told = |(left, mistake): (f64, MistakeKind)| (mistake, Some(left));
+        if let Some(misread) = self.read_otherwise().filter(|found| is_suspicious && explains(found)) {
+            return Some(told(misread));
+        }
         // Poses without a robot may be as coarse as they are; the links of a URDF are right to a percent.
         let is_told = !of_poses || is_suspicious;
-        let scale = || self.wrong_scale().filter(|(left, _)| is_told && *left < self.limits.scale_explains * misfit);
-        if let Some((left, mistake)) = misread().or_else(scale) {
-            return Some((mistake, Some(left)));
-        }
+        let scale = self.wrong_scale().filter(|(left, _)| is_told && *left < self.limits.scale_explains * misfit);
         if !is_suspicious {
-            return None;
+            return scale.map(told);
         }
-        let hypotheses = if of_poses {
-            shifted_rows(&self.readings()).into()
-        } else {
-            mistakes_undone(self.robot, &self.readings())
-        };
-        let tried: Vec<(f64, MistakeKind)> =
-            hypotheses.into_par_iter().map(|(readings, mistake)| (self.misfit(&readings), mistake)).collect();
-        let best = tried.into_iter().chain([self.wrong_mount()]).filter(explains).min_by(|a, b| a.0.total_cmp(&b.0));
-        match best {
-            Some((left, mistake)) => Some((mistake, Some(left))),
+        // A scale takes up something of every misfit.
+        let left_by_scale = scale.as_ref().map_or(f64::INFINITY, |(left, _)| *left);
+        let is_more = |(left, _): &(f64, MistakeKind)| *left < self.limits.mistake_explains * left_by_scale;
+        let undone = self.undone(misfit).filter(|found| explains(found) && is_more(found));
+        match undone.or(scale) {
+            Some(found) => Some(told(found)),
             None => self.other_lengths().filter(|_| !of_poses).map(|mistake| (mistake, None)),
         }
+    }
+
+    /// The mistake in readings or mounting that leaves least when it is undone, and how much that is.
+    fn undone(&self, misfit: f64) -> Option<(f64, MistakeKind)> {
+        let hypotheses = match self.robot.chain.pose_coordinates() {
+            Some(_) => shifted_rows(&self.readings()).into(),
+            None => mistakes_undone(self.robot, &self.readings()),
+        };
+        let partly = self.partly_shifted(misfit);
+        let is_partly = |of: &MistakeKind| partly.iter().any(|(_, partly)| partly.is_part_of(of));
+        let tried: Vec<(f64, MistakeKind)> = hypotheses
+            .into_par_iter()
+            .filter(|(_, mistake)| !is_partly(mistake))
+            .map(|(readings, mistake)| (self.misfit(&readings), mistake))
+            .collect();
+        let all = tried.into_iter().chain(partly.iter().cloned()).chain([self.wrong_mount()]);
+        all.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// Poses of a controller with a mistake undone, the best of them.
@@ -84,7 +100,7 @@ impl Suspects<'_> {
             .collect()
     }
 
-    fn misfit(&self, readings: &[Vec<f64>]) -> f64 {
+    pub(super) fn misfit(&self, readings: &[Vec<f64>]) -> f64 {
         self.misfit_mounted(readings, |mount| mount)
     }
 
@@ -133,11 +149,18 @@ impl Suspects<'_> {
         constant.next().map(|(_, (_, name))| name.clone())
     }
 
+    /// A plate is mistaken for one of another size, or its size is in another unit.
+    fn is_scale_of_plates(&self, scale: f64) -> bool {
+        let larger = scale.max(1.0 / scale);
+        let is_unit = |unit: &f64| (larger / unit - 1.0).abs() < self.limits.scale_of_unit;
+        larger < self.limits.scale_most || UNITS.iter().any(is_unit)
+    }
+
     fn wrong_scale(&self) -> Option<(f64, MistakeKind)> {
         let poses: Vec<PosePair> = self.pairs.iter().map(|(_, p)| *p).collect();
         let start = solve_hand_eye(&poses).into_iter().next()?;
         let scale = plate_scale(&poses, &start.solution)?;
-        if (scale - 1.0).abs() < self.limits.scale_error {
+        if (scale - 1.0).abs() < self.limits.scale_error || !self.is_scale_of_plates(scale) {
             return None;
         }
         let scaled: Vec<PosePair> = poses

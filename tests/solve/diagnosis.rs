@@ -67,6 +67,40 @@ fn the_size_of_a_plate_that_does_not_fit_is_told() {
     }
 }
 
+/// The row whose readings an image has.
+type RowOf<'a> = &'a dyn Fn(usize) -> usize;
+
+/// Of 24 images, with the readings that `of` gives to each by its place.
+fn said_of_rows(chain: &Chain, of: impl Fn(usize) -> usize) -> (Error, Vec<String>) {
+    let world = WorldRequest { images: 24, ..request(chain) };
+    let mut series = measured(&series(&world).unwrap(), chain);
+    let given: Vec<_> = series.stops.iter().map(|s| s.readings.clone()).collect();
+    let names = series.stops.iter().map(|s| s.image.clone()).collect();
+    (0..24).for_each(|k| series.stops[k].readings.clone_from(&given[of(k) % 24]));
+    (diagnosis(chain.clone(), series), names)
+}
+
+#[test]
+fn rows_that_are_shifted_from_an_image_on_are_told_from_a_shift_of_all() {
+    let chain = chain();
+    // A row was lost, a row was written twice, and one half was turned by a row.
+    let lost = |k: usize| if k < 8 { k } else { k + 1 };
+    let twice = |k: usize| if k < 5 { k } else { k - 1 };
+    let turned = |k: usize| if k < 11 { k } else { 11 + (k + 1) % 13 };
+    let cases: [(RowOf, usize, f64); 3] = [(&lost, 9, 15.0), (&twice, 5, 18.0), (&turned, 11, 12.0)];
+    for (of, first, images) in cases {
+        let (said, names) = said_of_rows(&chain, of);
+        assert_eq!((said.code, &said.place), (Code::RowsShifted, &names[first]), "{said}");
+        assert_eq!(number(&said, "images_shifted"), images, "{said}");
+        assert!(number(&said, "misfit_undone") < 0.01 && said.remedy.contains(&names[first]), "{said}");
+    }
+    for all in [1, 23] {
+        let (said, _) = said_of_rows(&chain, |k| k + all);
+        assert_eq!(said.code, Code::RowsShifted, "{said}");
+        assert!(said.quantities.iter().all(|q| q.name != "images_shifted"), "{said}");
+    }
+}
+
 #[test]
 fn joints_that_were_not_read_any_more_are_named_in_a_short_series() {
     let chain = chain();
