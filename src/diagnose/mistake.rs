@@ -47,6 +47,8 @@ pub enum MistakeKind {
     },
     /// The camera is mounted in the way that is not stated.
     Mount(CameraMount),
+    /// The images show the scene mirrored, and may be turned as well.
+    Mirrored,
     /// Directions fit and distances do not, medians over the images.
     Lengths {
         /// Of the directions, rad.
@@ -151,6 +153,7 @@ impl Kind for Mistake {
             MistakeKind::Coupled { .. } => Code::JointCoupled,
             MistakeKind::Rows { .. } => Code::RowsShifted,
             MistakeKind::Mount(_) => Code::CameraMountWrong,
+            MistakeKind::Mirrored => Code::ImagesMirrored,
             MistakeKind::Lengths { .. } => Code::LinkLengthsWrong,
             MistakeKind::PlateSize { .. } => Code::PlatePitchWrong,
             MistakeKind::Poses { code, .. } => *code,
@@ -248,6 +251,9 @@ impl Kind for Mistake {
                 let word = if *mount == CameraMount::Hand { "hand" } else { "fixed" };
                 format!("write camera_mount = \"{word}\" in series.toml")
             }
+            MistakeKind::Mirrored => {
+                "mirror the images back, or have camera and converter write them as the sensor sees (no mirroring, no exchange of rows and columns); if they are right, joints that turn the arm to its sides all count the other way, as A1, A4 and A6 of an arm with six joints".into()
+            }
             MistakeKind::Lengths { constant: Some(joint), .. } => format!(
                 "look whether {joint} moved between the stops: write its readings into joints.csv; if it stood still, check that the URDF is of this robot and size, with lengths in metres"
             ),
@@ -321,6 +327,9 @@ impl Mistake {
             }
             MistakeKind::Mount(CameraMount::Fixed) => {
                 "the camera stands still and the plate is in the hand: read so, the images fit".into()
+            }
+            MistakeKind::Mirrored => {
+                "the images are mirrored, or their rows and columns are exchanged: mirrored back they fit the joint readings".into()
             }
             MistakeKind::Lengths { angle_rad, distance_m, constant } => {
                 let fit = format!(

@@ -277,6 +277,7 @@ codes! {
         ReadingsExchanged "readings_exchanged" "images that were left out fit the readings of each other",
         RowsShifted "rows_shifted" "with the rows of joints.csv shifted by one the images fit",
         CameraMountWrong "camera_mount_wrong" "with the camera mounted the other way the images fit",
+        ImagesMirrored "images_mirrored" "with the images mirrored they fit the joint readings",
         LinkLengthsWrong "link_lengths_wrong" "directions fit and distances do not: another size of robot",
         PlatePitchWrong "plate_pitch_wrong" "with a plate of another size the images fit",
     }

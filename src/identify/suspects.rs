@@ -1,5 +1,6 @@
 //! When readings and images do not fit: the usual mistakes, tried one by one, named where one of them explains it.
 
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::bases;
@@ -7,6 +8,7 @@ use super::mistakes::{mistakes_undone, shifted_rows};
 use crate::assess::Limits;
 use crate::diagnose::MistakeKind;
 use crate::error::Code;
+use crate::geom::Pose;
 use crate::init::{PosePair, SeenStop, plate_scale, solve_hand_eye};
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
@@ -54,7 +56,7 @@ impl Suspects<'_> {
         }
     }
 
-    /// The mistake in readings or mounting that leaves least when it is undone, and how much that is.
+    /// The mistake in readings, mounting or pictures that leaves least when it is undone, and how much that is.
     fn undone(&self, misfit: f64) -> Option<(f64, MistakeKind)> {
         let hypotheses = match self.robot.chain.pose_coordinates() {
             Some(_) => shifted_rows(&self.readings()).into(),
@@ -67,7 +69,7 @@ impl Suspects<'_> {
             .filter(|(_, mistake)| !is_partly(mistake))
             .map(|(readings, mistake)| (self.misfit(&readings), mistake))
             .collect();
-        let all = tried.into_iter().chain(partly.iter().cloned()).chain([self.wrong_mount()]);
+        let all = tried.into_iter().chain(partly.iter().cloned()).chain([self.wrong_mount(), self.mirrored()]);
         all.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
@@ -101,14 +103,13 @@ impl Suspects<'_> {
     }
 
     pub(super) fn misfit(&self, readings: &[Vec<f64>]) -> f64 {
-        self.misfit_mounted(readings, |mount| mount)
+        self.misfit_with(readings, |stop| stop)
     }
 
-    fn misfit_mounted(&self, readings: &[Vec<f64>], changed: impl Fn(CameraMount) -> CameraMount) -> f64 {
-        let stop = |((i, pair), readings): (&(usize, PosePair), &Vec<f64>)| SeenStop {
-            readings: readings.clone(),
-            mount: changed(self.problem.images[*i].mount),
-            camera_from_plate: pair.camera_from_plate,
+    fn misfit_with(&self, readings: &[Vec<f64>], changed: impl Fn(SeenStop) -> SeenStop) -> f64 {
+        let stop = |((i, pair), readings): (&(usize, PosePair), &Vec<f64>)| {
+            let (readings, mount) = (readings.clone(), self.problem.images[*i].mount);
+            changed(SeenStop { readings, mount, camera_from_plate: pair.camera_from_plate })
         };
         let stops: Vec<SeenStop> = self.pairs.iter().zip(readings).map(stop).collect();
         // Where bases were found from the readings as they are, they are found anew.
@@ -125,7 +126,20 @@ impl Suspects<'_> {
             CameraMount::Fixed => CameraMount::Hand,
         };
         let stated = self.pairs.first().map_or(CameraMount::Hand, |(i, _)| self.problem.images[*i].mount);
-        (self.misfit_mounted(&self.readings(), exchanged), MistakeKind::Mount(exchanged(stated)))
+        let changed = |stop: SeenStop| SeenStop { mount: exchanged(stop.mount), ..stop };
+        (self.misfit_with(&self.readings(), changed), MistakeKind::Mount(exchanged(stated)))
+    }
+
+    /// Pictures that were mirrored. With `M = diag(-1, 1, 1)` the camera sees `p' = M (R p + t)` of a point p of the plate, and on a plate that looks
+    /// the same when it is mirrored the ids are those of `p' = M p`, but for a turn and a shift of the plate: the pose that is seen is
+    /// `(M R M, M t)`. A picture whose rows and columns are exchanged is mirrored and turned, as if the camera were turned with it.
+    fn mirrored(&self) -> (f64, MistakeKind) {
+        let mirror = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
+        let changed = |stop: SeenStop| {
+            let Pose { rotation, translation } = stop.camera_from_plate;
+            SeenStop { camera_from_plate: Pose::new(mirror * rotation * mirror, mirror * translation), ..stop }
+        };
+        (self.misfit_with(&self.readings(), changed), MistakeKind::Mirrored)
     }
 
     /// Directions fit and distances do not: the axes of this arm with other lengths.

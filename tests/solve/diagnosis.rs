@@ -128,6 +128,29 @@ fn an_exchanged_camera_mount_is_named() {
     assert!(said.remedy.contains("\"hand\""), "{said}");
 }
 
+/// A detector that does not know that the pictures are mirrored gives ids from the other side of a plate that looks the same from there.
+#[test]
+fn mirrored_and_transposed_images_are_named() {
+    let chain = chain();
+    for is_transposed in [false, true] {
+        let mut series = seen(&chain);
+        let (width_px, columns) = (f64::from(series.width_px), series.plate.columns);
+        for stop in &mut series.stops {
+            for o in stop.observations.iter_mut() {
+                o.uv = if is_transposed { [o.uv[1], o.uv[0]] } else { [width_px - 1.0 - o.uv[0], o.uv[1]] };
+                o.marker = o.marker / columns * columns + columns - 1 - o.marker % columns;
+            }
+            stop.observations.sort_by_key(|o| (o.marker, o.edge));
+        }
+        if is_transposed {
+            (series.width_px, series.height_px) = (series.height_px, series.width_px);
+        }
+        let said = diagnosis(chain.clone(), series);
+        assert_eq!(said.code, Code::ImagesMirrored, "{said}");
+        assert!(number(&said, "misfit_undone") < 0.01, "{said}");
+    }
+}
+
 #[test]
 fn mistakes_in_single_columns_are_named() {
     let chain = chain();
