@@ -231,6 +231,8 @@ limits! {
     suspicious_misfit: f64 = 0.025;
     /// Median misfit of distances, with directions that fit, from which the links are those of another robot, m.
     other_lengths_m: f64 = 0.025;
+    /// Fewest stops at all of which a joint reads the same before that is named as the likely cause: of few stops some leave a joint alone.
+    constant_stops: usize = 8;
     /// A mistake explains the misfit where undoing it leaves less than this share of it.
     mistake_explains: f64 = 0.25;
     /// Relative error of the scale of the plate that is told from errors of the robot: nominal links are right to a percent.

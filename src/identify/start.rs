@@ -8,7 +8,7 @@ use super::start_verdict::{StartReached, StartVerdict};
 use super::suspects::Suspects;
 use crate::assess::{Limits, median};
 use crate::diagnose::{Finding, Mistake};
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Quantity, Result};
 use crate::fit::FreePoses;
 use crate::geom::log_so3;
 use crate::init::{HandEye, HandEyeStart, PosePair, SeenStop, Zeros, shah, solve_hand_eye, solve_zeros, upper_median};
@@ -263,7 +263,10 @@ fn check_fit(suspects: &Suspects, misfit: f64, of: &str, how: &str) -> Result<()
         if let Some(broken) = broken(suspects, misfit, of) {
             return Err(broken);
         }
-        return Err(no_fit(of, &format!("{how} the camera poses miss by {:.0} (median, mm plus mrad)", 1e3 * misfit)));
+        let how = format!("{how} the camera poses miss by {:.0} (median, mm plus mrad)", 1e3 * misfit);
+        return Err(suspects
+            .constant_joints()
+            .map_or_else(|| no_fit(of, &how), |joints| not_moved(&joints, suspects, &how)));
     }
     Ok(())
 }
@@ -275,6 +278,19 @@ fn no_fit(of: &str, what: &str) -> Error {
         format!("joint readings and images do not belong together: {what}"),
         "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows (of a recording: the clocks, see --image-delay and --clock log), that the URDF is of this robot, base and tip, and that the plate did not move",
     )
+}
+
+/// Refuses readings that contradict, where some joints read the same at all stops.
+fn not_moved(joints: &[String], suspects: &Suspects, what: &str) -> Error {
+    let (names, stops) = (joints.join(", "), suspects.pairs.len());
+    let what = format!(
+        "reads the same at all {stops} stops, and joint readings and images do not belong together: {what}; it may have moved without being read"
+    );
+    let remedy = format!(
+        "see whether {names} moved between the stops, and write its readings into joints.csv; if it stood still, check joint_unit, the order and signs of the joints, the rows of the images, and that the URDF is of this robot, base and tip"
+    );
+    let stops = Quantity::new("stops", stops as f64, "1");
+    Error { quantities: vec![stops], ..Error::new(Code::ReadingsContradict, names, what, remedy) }
 }
 
 /// RMS pixel error of an image at the pose that its readings predict; `None` where a marker lies behind the camera.

@@ -156,11 +156,21 @@ impl Suspects<'_> {
 
     /// A prismatic joint that reads the same at all stops.
     fn constant_slide(&self) -> Option<String> {
+        self.constant(|kind| kind == JointKind::Prismatic).into_iter().next()
+    }
+
+    /// The joints that read the same at all stops, where these are many.
+    pub fn constant_joints(&self) -> Option<Vec<String>> {
+        let is_arm = self.robot.chain.pose_coordinates().is_none();
+        let joints = self.constant(|_| is_arm && self.pairs.len() >= self.limits.constant_stops);
+        (!joints.is_empty()).then_some(joints)
+    }
+
+    fn constant(&self, which: impl Fn(JointKind) -> bool) -> Vec<String> {
         let (chain, readings) = (&self.robot.chain, self.readings());
         let is_constant = |k: usize| readings.windows(2).all(|pair| pair[0].get(k) == pair[1].get(k));
-        let slides = chain.reading_kinds.iter().zip(&chain.readings).enumerate();
-        let mut constant = slides.filter(|(k, (kind, _))| **kind == JointKind::Prismatic && is_constant(*k));
-        constant.next().map(|(_, (_, name))| name.clone())
+        let joints = chain.reading_kinds.iter().zip(&chain.readings).enumerate();
+        joints.filter(|(k, (kind, _))| which(**kind) && is_constant(*k)).map(|(_, (_, name))| name.clone()).collect()
     }
 
     /// A plate is mistaken for one of another size, or its size is in another unit.

@@ -119,6 +119,20 @@ fn joints_that_were_not_read_any_more_are_named_in_a_short_series() {
 }
 
 #[test]
+fn a_joint_that_reads_the_same_at_all_stops_is_named() {
+    let chain = chain();
+    for joint in [0, 1] {
+        let mut series = seen(&chain);
+        let first = series.stops[0].readings.as_ref().unwrap()[joint];
+        series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| q[joint] = first);
+        let said = diagnosis(chain.clone(), series);
+        let name = &chain.readings[joint];
+        assert_eq!((said.code, &said.place), (Code::ReadingsContradict, name), "{said}");
+        assert!(number(&said, "stops") > 15.5 && said.remedy.contains(name), "{said}");
+    }
+}
+
+#[test]
 fn an_exchanged_camera_mount_is_named() {
     let chain = chain();
     let mut series = seen(&chain);
