@@ -7,12 +7,12 @@ use rand::SeedableRng;
 use rand::rngs::SmallRng;
 use rayon::prelude::*;
 
-use crate::error::{Code, Error, Notice, Result};
+use crate::error::{Code, Error, Notice, Quantity, Result};
 use crate::geom::Pose;
 use crate::model::inverse::{random_readings, reading_limits, solve_from};
 use crate::model::robot::Robot;
 use crate::problem::MeasuredStop;
-use crate::series::{ControllerPoses, Series};
+use crate::series::{ControllerPoses, ReadOtherwise, Series};
 use crate::urdf::{Chain, JointKind};
 
 /// Coordinates of a pose.
@@ -25,6 +25,8 @@ const MOST_POSTURES: usize = 15;
 const SAME: f64 = 1e-3;
 /// Angles that are stated for a posture are nearer than this, rad: another posture is farther.
 const FARTHEST_STATED_RAD: f64 = 0.5;
+/// Units that positions are in when they are not in metres, and metres of each.
+const LENGTH_UNITS: [(&str, f64); 3] = [("inches", 0.0254), ("millimetres", 1e-3), ("centimetres", 1e-2)];
 /// Poses that tell whether the poses of a series can be reached.
 const TRIED: usize = 8;
 
@@ -79,6 +81,30 @@ pub(super) fn notice(series: &Series, chain: &Chain) -> Option<Notice> {
         .then(|| Notice::new(Code::PosturesFromPoses, series.readings_file().display(), what, remedy))
 }
 
+/// A pose read as with this mistake undone, from this unit of length.
+type ReadAs<'a> = (Option<&'a ReadOtherwise>, Option<&'a (&'static str, f64)>, Pose);
+
+const fn is_angle(kind: JointKind) -> bool {
+    !matches!(kind, JointKind::Prismatic)
+}
+
+/// Poses that the stated angles reach when they are read otherwise, or in another unit.
+fn misread(other: Option<&ReadOtherwise>, unit: Option<&(&str, f64)>, place: String) -> Error {
+    let fit = "the robot reaches them with the angles of first_stop_deg";
+    let rotations = other.map(|o| (o.code, o.what.replace("the images fit", fit), o.remedy.clone()));
+    let Some((name, metres)) = unit else {
+        let (code, what, remedy) = rotations.unwrap_or_else(|| (Code::SettingConflict, String::new(), String::new()));
+        return Error::new(code, place, what, remedy);
+    };
+    let (what, remedy) = (format!("positions are in {name}"), format!("multiply x_m, y_m and z_m by {metres}"));
+    match rotations {
+        Some((_, also, do_also)) => {
+            Error::new(Code::MeasuredUnit, place, format!("{what}, and {also}"), format!("{remedy}; {do_also}"))
+        }
+        None => Error::new(Code::MeasuredUnit, place, format!("{what}: in metres {fit}"), remedy),
+    }
+}
+
 /// An arm whose postures are looked for.
 struct Arm {
     robot: Robot,
@@ -99,7 +125,7 @@ impl Arm {
                 continue;
             };
             let readings = match &poses.stated_deg[row] {
-                Some(stated_deg) => self.near_stated(series, pose, stated_deg)?,
+                Some(stated_deg) => self.near_stated(series, poses, row, stated_deg)?,
                 None => self.nearest(pose, before.as_deref()).ok_or_else(|| self.out_of_reach(series, poses, row))?,
             };
             before = Some(readings.clone());
@@ -109,7 +135,13 @@ impl Arm {
     }
 
     /// The posture that was stated, deg (m of a prismatic joint).
-    fn near_stated(&self, series: &Series, pose: &Pose, stated_deg: &[f64]) -> Result<Vec<f64>> {
+    fn near_stated(
+        &self,
+        series: &Series,
+        poses: &ControllerPoses,
+        row: usize,
+        stated_deg: &[f64],
+    ) -> Result<Vec<f64>> {
         let chain = &self.robot.chain;
         let place = format!("{}: [controller] first_stop_deg", series.folder.join("series.toml").display());
         if stated_deg.len() != chain.readings.len() {
@@ -117,21 +149,77 @@ impl Arm {
                 format!("has {} values, and the robot the joints {}", stated_deg.len(), chain.readings.join(", "));
             return Err(Error::new(Code::SettingRange, place, what, "give the angles of all of them in this order"));
         }
-        let is_angle = |kind: &JointKind| *kind != JointKind::Prismatic;
-        let read = |(v, kind): (&f64, &JointKind)| if is_angle(kind) { v.to_radians() } else { *v };
+        let read = |(v, kind): (&f64, &JointKind)| if is_angle(*kind) { v.to_radians() } else { *v };
         let stated: Vec<f64> = stated_deg.iter().zip(&chain.reading_kinds).map(read).collect();
-        let farthest_rad = |q: &Vec<f64>| {
-            let angles = q.iter().zip(&stated).zip(&chain.reading_kinds).filter(|(_, kind)| is_angle(kind));
-            angles.map(|((q, s), _)| (q - s).abs()).fold(0.0, f64::max)
+        let found = poses.base_from_flange[row].and_then(|pose| self.posture_near(&pose, &stated));
+        found.ok_or_else(|| self.not_as_stated(series, poses, row, &stated, place))
+    }
+
+    /// The posture that reaches a pose nearest to the stated one, if it is near.
+    fn posture_near(&self, pose: &Pose, stated: &[f64]) -> Option<Vec<f64>> {
+        let by_start = solve_from(&self.robot, &self.limits, pose, stated);
+        let all = by_start.into_iter().chain(self.postures_of(pose)).map(|q| self.turned(q, stated));
+        let found = all.min_by(|a, b| self.farthest_rad(a, stated).total_cmp(&self.farthest_rad(b, stated)));
+        found.filter(|q| self.farthest_rad(q, stated) < FARTHEST_STATED_RAD)
+    }
+
+    /// Largest difference of the angles of two postures.
+    fn farthest_rad(&self, readings: &[f64], stated: &[f64]) -> f64 {
+        let angles = readings.iter().zip(stated).zip(&self.robot.chain.reading_kinds).filter(|(_, k)| is_angle(**k));
+        angles.map(|((q, s), _)| (q - s).abs()).fold(0.0, f64::max)
+    }
+
+    /// Of ways to read a pose, by their place, the one that the stated posture is nearest to, if it is near.
+    fn nearest_to(&self, stated: &[f64], poses: impl Iterator<Item = Pose>) -> Option<usize> {
+        let off = |pose: Pose| {
+            let found = solve_from(&self.robot, &self.limits, &pose, stated)?;
+            Some(self.farthest_rad(&self.turned(found, stated), stated))
         };
-        let by_start = solve_from(&self.robot, &self.limits, pose, &stated);
-        let all = by_start.into_iter().chain(self.postures_of(pose)).map(|q| self.turned(q, &stated));
-        let found = all.min_by(|a, b| farthest_rad(a).total_cmp(&farthest_rad(b)));
-        found.filter(|q| farthest_rad(q) < FARTHEST_STATED_RAD).ok_or_else(|| {
-            let what = "the robot of the URDF reaches the first pose in no posture near these angles";
-            let remedy = "give the joint angles that the controller shows at the first stop, in deg, with zeros and signs as in the URDF";
-            Error::new(Code::SettingConflict, place, what, remedy)
-        })
+        let all = poses.enumerate().filter_map(|(k, pose)| Some((k, off(pose)?)));
+        let near = all.filter(|(_, off)| *off < FARTHEST_STATED_RAD);
+        near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
+    }
+
+    /// Where the stated posture does not reach the pose: the mistake in the poses that explains it, if there is one.
+    fn not_as_stated(
+        &self,
+        series: &Series,
+        poses: &ControllerPoses,
+        row: usize,
+        stated: &[f64],
+        place: String,
+    ) -> Error {
+        let line = &series.stops.stops[row];
+        let of_poses = format!("{}:{}, stop {}", series.readings_file().display(), line.line, line.name());
+        let written = poses.base_from_flange[row];
+        let others: Vec<(&ReadOtherwise, Pose)> =
+            poses.otherwise.iter().filter_map(|other| Some((other, other.poses[row]?))).collect();
+        let turned = others.iter().map(|(other, pose)| (Some(*other), None, *pose));
+        let scaled = |other, pose: Pose| {
+            LENGTH_UNITS
+                .iter()
+                .map(move |unit| (other, Some(unit), Pose::new(pose.rotation, pose.translation * unit.1)))
+        };
+        let one: Vec<ReadAs> = written.iter().flat_map(|pose| scaled(None, *pose)).chain(turned).collect();
+        let two: Vec<ReadAs> = others.iter().flat_map(|(other, pose)| scaled(Some(*other), *pose)).collect();
+        for ways in [one, two] {
+            if let Some(k) = self.nearest_to(stated, ways.iter().map(|(.., pose)| *pose)) {
+                let (other, unit, _) = ways[k];
+                return misread(other, unit, of_poses);
+            }
+        }
+        let tip = self.robot.base_from_tip(stated);
+        let apart = written.map_or((0.0, 0.0), |pose| tip.distance(&pose));
+        let what = format!(
+            "the robot of the URDF reaches the first pose in no posture near these angles: at them it is {:.0} mm and {:.0} deg from that pose",
+            1e3 * apart.1,
+            apart.0.to_degrees()
+        );
+        let remedy = "give the joint angles that the controller shows at the first stop, in deg, with zeros and signs as in the URDF; if they are \
+                      right, the poses are not those of the flange in the base (a tool, a user frame or a work object was active), or their unit or \
+                      [controller] rotation is another";
+        let quantities = vec![Quantity::new("distance", apart.1, "m"), Quantity::new("angle", apart.0, "rad")];
+        Error { quantities, ..Error::new(Code::SettingConflict, place, what, remedy) }
     }
 
     /// The same posture by full turns as near to some readings as the limits allow.

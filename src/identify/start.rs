@@ -13,6 +13,7 @@ use crate::fit::FreePoses;
 use crate::geom::log_so3;
 use crate::init::{HandEye, HandEyeStart, PosePair, SeenStop, Zeros, shah, solve_hand_eye, solve_zeros, upper_median};
 use crate::linalg::symmetric_eigen;
+use crate::model::robot::Robot;
 use crate::problem::{
     Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
 };
@@ -205,7 +206,7 @@ fn closed_form(
     let mut ranked: Vec<(f64, &HandEyeStart)> = starts.iter().take(COMPARED).map(|s| (cost(s), s)).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
     let Some((_, best)) = ranked.first() else {
-        return Err(no_fit(of, "no closed form has a solution"));
+        return Err(no_fit(of, &state.robot, "no closed form has a solution"));
     };
     let winner = best.origin.clone();
     for s in &starts {
@@ -266,18 +267,24 @@ fn check_fit(suspects: &Suspects, misfit: f64, of: &str, how: &str) -> Result<()
         let how = format!("{how} the camera poses miss by {:.0} (median, mm plus mrad)", 1e3 * misfit);
         return Err(suspects
             .constant_joints()
-            .map_or_else(|| no_fit(of, &how), |joints| not_moved(&joints, suspects, &how)));
+            .map_or_else(|| no_fit(of, suspects.robot, &how), |joints| not_moved(&joints, suspects, &how)));
     }
     Ok(())
 }
 
-fn no_fit(of: &str, what: &str) -> Error {
-    Error::new(
-        Code::ReadingsContradict,
-        of,
-        format!("joint readings and images do not belong together: {what}"),
-        "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows (of a recording: the clocks, see --image-delay and --clock log), that the URDF is of this robot, base and tip, and that the plate did not move",
-    )
+fn no_fit(of: &str, robot: &Robot, how: &str) -> Error {
+    let (what, remedy) = match robot.chain.pose_coordinates() {
+        Some(_) => (
+            "poses of the controller",
+            "check [controller] rotation and the unit of x_m, y_m, z_m (both may be wrong), that the poses are those of the flange in the base of the robot at these images (one tool, one user frame all through), that image names stand in the right rows of controller.csv, and that the plate did not move",
+        ),
+        None => (
+            "joint readings",
+            "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows (of a recording: the clocks, see --image-delay and --clock log), that the URDF is of this robot, base and tip, and that the plate did not move",
+        ),
+    };
+    let what = format!("{what} and images do not belong together: {how}");
+    Error::new(Code::ReadingsContradict, of, what, remedy)
 }
 
 /// Refuses readings that contradict, where some joints read the same at all stops.

@@ -196,6 +196,16 @@ fn mistakes_in_poses_are_named() {
     }
 }
 
+#[test]
+fn poses_that_contradict_are_told_apart_from_joint_readings() {
+    let poses: Vec<_> = poses(&truth(), 7).into_iter().take(14).collect();
+    let images = poses.iter().map(|(image, _)| image.clone());
+    let of_others: Vec<_> = images.zip(poses.iter().rev().map(|(_, pose)| *pose)).collect();
+    let error = calibrated(&series("quaternion", "qx,qy,qz,qw", &of_others, quaternion)).unwrap_err();
+    assert_eq!(error.code, Code::ReadingsContradict, "{error}");
+    assert!(error.remedy.contains("controller.csv") && !error.remedy.contains("joints.csv"), "{error}");
+}
+
 fn urdf() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf")
 }
@@ -254,6 +264,36 @@ fn stated_angles_of_the_first_stop_fix_its_posture() {
     let elsewhere: Vec<f64> = all.iter().map(|a| a + 40.0).collect();
     assert_eq!(read(40, Some(&all[..5])).unwrap_err().code, Code::SettingRange);
     assert_eq!(read(40, Some(&elsewhere)).unwrap_err().code, Code::SettingConflict);
+}
+
+#[test]
+fn mistakes_in_the_poses_are_not_blamed_on_right_angles_of_the_first_stop() {
+    let (robot, readings, poses) = by_joints();
+    let tens: Vec<f64> = readings[40].iter().map(|q| 10.0 * (q.to_degrees() / 10.0).round()).collect();
+    let moved =
+        |by: &dyn Fn(&Pose) -> Pose| -> Vec<_> { poses[40..].iter().map(|(i, p)| (i.clone(), by(p))).collect() };
+    let inches = moved(&|p| Pose::new(p.rotation, p.translation / 0.0254));
+    let of_frame = Pose::exp(&Vector6::new(1.5, -0.8, 0.2, 0.0, 0.0, 1.2));
+    let in_frame = moved(&|p| of_frame * *p);
+    let wpr = |p: &Pose| p.rpy().map(f64::to_degrees).to_vec();
+    let cases: [(TempDir, Code, &str); 4] = [
+        (series("quaternion", "qx,qy,qz,qw", &inches, quaternion), Code::MeasuredUnit, "controller.csv:2"),
+        (series("abc_deg", "a,b,c", &poses[40..], wpr), Code::RotationConvention, "controller.csv:2"),
+        (series("abc_deg", "a,b,c", &inches, wpr), Code::MeasuredUnit, "controller.csv:2"),
+        (series("quaternion", "qx,qy,qz,qw", &in_frame, quaternion), Code::SettingConflict, "first_stop_deg"),
+    ];
+    for (folder, code, place) in cases {
+        let path = folder.path().join("series.toml");
+        fs::write(&path, fs::read_to_string(&path).unwrap() + &format!("first_stop_deg = {tens:?}\n")).unwrap();
+        let read = robotcal::series::read(folder.path()).unwrap();
+        let error = robotcal::identify::readings_of(&read, &robot.chain).unwrap_err();
+        assert_eq!(error.code, code, "{error}");
+        assert!(error.place.contains(place), "{error}");
+        if code == Code::SettingConflict {
+            let distance = error.quantities.iter().find(|q| q.name == "distance").unwrap().value;
+            assert!((0.2..4.0).contains(&distance), "{error}");
+        }
+    }
 }
 
 #[test]
