@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::bases;
 use super::breaks::broken;
 use super::start_verdict::{StartReached, StartVerdict};
-use super::suspects::Suspects;
+use super::suspects::{Suspects, best_scale, directions_alone, left_by_scale};
 use crate::assess::{Limits, median};
 use crate::diagnose::{Finding, Mistake};
 use crate::error::{Code, Error, Quantity, Result};
@@ -146,8 +146,15 @@ fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
     let otherwise = tried.next().map_or(f64::INFINITY, |next| next.left).min(as_described);
     let is_far = best.offsets.iter().any(|o| o.abs() > limits.zeros_off_rad);
     let explains = best.left < limits.zeros_explain && best.left < limits.zeros_explain_share * otherwise;
+    // Zeros of parallel joints whose sum vanishes turn nothing, and look like links or a plate of another size.
+    let by_scale = || best_scale(&pairs).and_then(|scale| left_by_scale(&pairs, scale)).unwrap_or(f64::INFINITY);
+    let look_like_lengths = || {
+        best.left < limits.suspicious_misfit
+            && directions_alone(&pairs, limits).is_some()
+            && best.left < limits.zeros_explain_share * by_scale()
+    };
     // Zeros alone are a matter of the fit as long as it starts.
-    let is_needed = best.reversed.is_some() || as_described > limits.hand_eye_spread;
+    let is_needed = best.reversed.is_some() || as_described > limits.hand_eye_spread || look_like_lengths();
     if !(is_far && explains && is_needed) {
         return;
     }

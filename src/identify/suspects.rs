@@ -9,7 +9,7 @@ use crate::assess::Limits;
 use crate::diagnose::MistakeKind;
 use crate::error::Code;
 use crate::geom::Pose;
-use crate::init::{PosePair, SeenStop, plate_scale, solve_hand_eye};
+use crate::init::{PosePair, SeenStop, plate_scale, solve_hand_eye, upper_median};
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
 use crate::series::{CameraMount, spread};
@@ -145,13 +145,8 @@ impl Suspects<'_> {
     /// Directions fit and distances do not: the axes of this arm with other lengths.
     fn other_lengths(&self) -> Option<MistakeKind> {
         let poses: Vec<PosePair> = self.pairs.iter().map(|(_, p)| *p).collect();
-        let start = solve_hand_eye(&poses).into_iter().next()?;
-        let (mut angles, mut distances): (Vec<f64>, Vec<f64>) = poses.iter().map(|p| start.solution.error(p)).unzip();
-        angles.sort_by(f64::total_cmp);
-        distances.sort_by(f64::total_cmp);
-        let (angle_rad, distance_m) = (angles[angles.len() / 2], distances[distances.len() / 2]);
-        (angle_rad < self.limits.suspicious_misfit && distance_m > self.limits.other_lengths_m)
-            .then(|| MistakeKind::Lengths { angle_rad, distance_m, constant: self.constant_slide() })
+        let (angle_rad, distance_m) = directions_alone(&poses, self.limits)?;
+        Some(MistakeKind::Lengths { angle_rad, distance_m, constant: self.constant_slide() })
     }
 
     /// A prismatic joint that reads the same at all stops.
@@ -182,20 +177,11 @@ impl Suspects<'_> {
 
     fn wrong_scale(&self) -> Option<(f64, MistakeKind)> {
         let poses: Vec<PosePair> = self.pairs.iter().map(|(_, p)| *p).collect();
-        let start = solve_hand_eye(&poses).into_iter().next()?;
-        let scale = plate_scale(&poses, &start.solution)?;
+        let scale = best_scale(&poses)?;
         if (scale - 1.0).abs() < self.limits.scale_error || !self.is_scale_of_plates(scale) {
             return None;
         }
-        let scaled: Vec<PosePair> = poses
-            .iter()
-            .map(|p| {
-                let mut pose = p.camera_from_plate;
-                pose.translation *= scale;
-                PosePair { camera_from_plate: pose, ..*p }
-            })
-            .collect();
-        let error = solve_hand_eye(&scaled).first()?.median_error;
+        let error = left_by_scale(&poses, scale)?;
         let plate = &self.problem.plates[self.problem.images[self.pairs.first()?.0].plate];
         if self.robot.chain.pose_coordinates().is_some() {
             let what = format!(
@@ -207,4 +193,27 @@ impl Suspects<'_> {
         }
         Some((error, MistakeKind::PlateSize { scale, pitch_m: plate.pitch_m }))
     }
+}
+
+/// Median misfits of directions, rad, and of distances, m, where directions fit and distances do not.
+pub(super) fn directions_alone(pairs: &[PosePair], limits: &Limits) -> Option<(f64, f64)> {
+    let start = solve_hand_eye(pairs).into_iter().next()?;
+    let (angles, distances): (Vec<f64>, Vec<f64>) = pairs.iter().map(|p| start.solution.error(p)).unzip();
+    let (angle_rad, distance_m) = (upper_median(angles), upper_median(distances));
+    (angle_rad < limits.suspicious_misfit && distance_m > limits.other_lengths_m).then_some((angle_rad, distance_m))
+}
+
+/// The scale of the plate that fits best.
+pub(super) fn best_scale(pairs: &[PosePair]) -> Option<f64> {
+    plate_scale(pairs, &solve_hand_eye(pairs).first()?.solution)
+}
+
+/// The median misfit that a scale of the plate leaves.
+pub(super) fn left_by_scale(pairs: &[PosePair], scale: f64) -> Option<f64> {
+    let scaled = pairs.iter().map(|p| {
+        let mut pose = p.camera_from_plate;
+        pose.translation *= scale;
+        PosePair { camera_from_plate: pose, ..*p }
+    });
+    Some(solve_hand_eye(&scaled.collect::<Vec<_>>()).first()?.median_error)
 }

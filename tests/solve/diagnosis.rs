@@ -51,6 +51,25 @@ fn a_larger_robot_of_the_same_build_is_named() {
     assert!(angle < 0.01 && (0.03..0.4).contains(&distance), "{angle} rad, {distance} m");
 }
 
+/// They turn nothing, and look like other link lengths.
+#[test]
+fn zeros_of_parallel_joints_that_cancel_are_found() {
+    let chain = chain();
+    let world = WorldRequest { images: 24, ..request(&chain) };
+    let mut series = measured(&series(&world).unwrap(), &chain);
+    let off = 15f64.to_radians();
+    series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| (q[1], q[2]) = (q[1] + off, q[2] - off));
+    let solution = identify(chain, &[series], &Options::default()).unwrap();
+    for (name, lacks) in [("joint_a2", -off), ("joint_a3", off)] {
+        let found = solution.findings.iter().find_map(|f| match f {
+            Finding::ZeroOff(zero) if zero.joint == name => Some(zero),
+            _ => None,
+        });
+        let found = found.unwrap_or_else(|| panic!("{name}: {:?}", solution.findings));
+        assert!(!found.is_reversed && (found.offset - lacks).abs() < 0.03, "{found:?}");
+    }
+}
+
 #[test]
 fn the_size_of_a_plate_that_does_not_fit_is_told() {
     let chain = chain();
