@@ -102,6 +102,12 @@ limits! {
     /// Agreement of the new place over its images, as a share of the distance to the old one.
     moved_agreement: f64 = 0.2;
 
+    /// Tilt beside a quarter or half turn about the optical axis, rad, up to which the picture is turned and not the camera: the axis does not
+    /// meet the middle of the picture, by some 50 px of a focal length of 1000 to either side.
+    turned_image_rad: f64 = 0.1;
+    /// Distance beside it, m: what a robot far from nominal may miss by; most cameras that are mounted anew the other way round sit farther off.
+    turned_image_m: f64 = 0.02;
+
     /// Fewest images on either side of a displacement: six parameters need more than one image.
     displaced_images: usize = 3;
     /// Share of the squares of the joint noise that a displacement must explain: real robots err alike in postures that are alike.

@@ -3,8 +3,10 @@
 //! An image shows the tip at `B` (`Z C^-1 X^-1` of a camera in the hand, `X C Z^-1` of a fixed one, as in [`crate::init::HandEye`]), its readings
 //! put it at `A`. Where one reading alone is off by `d`, `B A^-1 = exp(d s)`, `s` the twist of its joint in the base, however large `d` is.
 
+use nalgebra::Vector3;
+
 use crate::assess::Limits;
-use crate::geom::{Pose, log_so3};
+use crate::geom::{Pose, exp_so3, log_so3};
 use crate::init::{HandEye, SeenStop};
 use crate::model::robot::Robot;
 use crate::series::{CameraMount, spread};
@@ -38,6 +40,13 @@ pub enum Moved {
         /// rad.
         angle_rad: f64,
     },
+    /// The pictures, about the optical axis: the camera would sit where it does, turned by quarter turns.
+    Images {
+        /// By how much they are turned, clockwise, rad.
+        turn_rad: f64,
+        /// How far the camera would be from its place, m.
+        distance_m: f64,
+    },
     /// The readings, by another amount at each stop.
     Readings {
         /// Name of the joint; none where it is all of them.
@@ -50,7 +59,7 @@ pub enum Moved {
 impl Moved {
     const fn unknowns(&self) -> f64 {
         match self {
-            Self::Plate { .. } | Self::Camera { .. } => 6.0,
+            Self::Plate { .. } | Self::Camera { .. } | Self::Images { .. } => 6.0,
             _ => 1.0,
         }
     }
@@ -58,7 +67,7 @@ impl Moved {
     const fn body(&self) -> Option<&'static str> {
         match self {
             Self::Plate { .. } => Some("the plate"),
-            Self::Camera { .. } => Some("the camera"),
+            Self::Camera { .. } | Self::Images { .. } => Some("the camera"),
             _ => None,
         }
     }
@@ -84,7 +93,7 @@ pub fn agreement(robot: &Robot, others: &HandEye, seen: &[SeenStop], limits: &Li
     };
     let zeros = readings.clone().filter_map(|joint| zero(robot, &stops, joint, limits));
     let plate = place(&stops, &others.plate, |stop| stop.plate, limits, plate_moved);
-    let camera = place(&stops, &others.camera, |stop| stop.camera, limits, camera_moved);
+    let camera = place(&stops, &others.camera, |stop| stop.camera, limits, |old, new| camera_moved(old, new, limits));
     let all: Vec<Agreement> = zeros.chain(plate).chain(camera).collect();
     let most = all.iter().map(|a| a.members.len()).max().unwrap_or(0);
     let weighed = |a: &Agreement| a.moved.unknowns() * a.spread;
@@ -145,7 +154,7 @@ impl<'a> Stop<'a> {
         let by_offset = |offset: f64| robot.base_from_tip(&self.readings_with(joint, offset)) * back;
         let (step, whole) = (by_offset(STEP), self.by_image * back);
         let (turn, shift) = (log_so3(&step.rotation) / STEP, step.translation / STEP);
-        let along = |by: nalgebra::Vector3<f64>, whole: nalgebra::Vector3<f64>| by.dot(&whole) / by.norm_squared();
+        let along = |by: Vector3<f64>, whole: Vector3<f64>| by.dot(&whole) / by.norm_squared();
         match turn.norm() > f64::EPSILON.sqrt() {
             true => Some(along(turn, log_so3(&whole.rotation))),
             false if shift.norm() > f64::EPSILON.sqrt() => Some(along(shift, whole.translation)),
@@ -235,12 +244,29 @@ fn copied(stops: &[Stop], limits: &Limits) -> Option<Agreement> {
     (differ + 1 >= limits.moved_images).then_some(Agreement { moved, members, spread })
 }
 
-fn plate_moved((angle_rad, distance_m): (f64, f64)) -> Moved {
+fn plate_moved(old: &Pose, new: &Pose) -> Moved {
+    let (angle_rad, distance_m) = old.distance(new);
     Moved::Plate { distance_m, angle_rad }
 }
 
-fn camera_moved((angle_rad, distance_m): (f64, f64)) -> Moved {
-    Moved::Camera { distance_m, angle_rad }
+fn camera_moved(old: &Pose, new: &Pose, limits: &Limits) -> Moved {
+    let (angle_rad, distance_m) = old.distance(new);
+    match turned_pictures(&(old.inverse() * *new), limits) {
+        Some(turn_rad) => Moved::Images { turn_rad, distance_m },
+        None => Moved::Camera { distance_m, angle_rad },
+    }
+}
+
+/// By how much pictures are turned, clockwise, where a camera moved by `by` in its own frame: one that shows the scene turned by T about its axis
+/// seems turned by the inverse of T.
+fn turned_pictures(by: &Pose, limits: &Limits) -> Option<f64> {
+    let turn = |quarters: f64| quarters * std::f64::consts::FRAC_PI_2;
+    let is_turned = |quarters: &f64| {
+        let picture = exp_so3(&Vector3::new(0.0, 0.0, turn(*quarters)));
+        log_so3(&(by.rotation * picture)).norm() < limits.turned_image_rad
+    };
+    let quarters = [2.0, 1.0, -1.0].into_iter().find(is_turned)?;
+    (by.translation.norm() < limits.turned_image_m).then(|| turn(quarters))
 }
 
 /// The place of a body that most stops agree on, near enough beside how far it is from the `old` one.
@@ -249,7 +275,7 @@ fn place(
     old: &Pose,
     of: impl Fn(&Stop) -> Pose,
     limits: &Limits,
-    moved: fn((f64, f64)) -> Moved,
+    moved: impl Fn(&Pose, &Pose) -> Moved,
 ) -> Option<Agreement> {
     let (place, members, spread) = common(
         some(stops).map(&of),
@@ -258,5 +284,30 @@ fn place(
         |candidate, _| bound(old.misfit(&candidate), limits),
         limits.moved_images,
     )?;
-    Some(Agreement { moved: moved(old.distance(&place)), members, spread })
+    Some(Agreement { moved: moved(old, &place), members, spread })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector6;
+
+    #[test]
+    fn a_camera_that_seems_turned_about_its_axis_alone_has_turned_pictures() {
+        let limits = Limits::default();
+        let turned = |angle: f64, x_m: f64, tilt: f64| {
+            let by = Pose::exp(&Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, angle));
+            let beside = Pose::exp(&Vector6::new(x_m, 0.0, 0.0, tilt, 0.0, 0.0));
+            turned_pictures(&(by * beside), &limits)
+        };
+        let quarter = std::f64::consts::FRAC_PI_2;
+        for (angle, of_picture) in [(-quarter, quarter), (quarter, -quarter), (2.0 * quarter, 2.0 * quarter)] {
+            assert!((turned(angle, 1e-3, 0.02).unwrap() - of_picture).abs() < 1e-12);
+        }
+        for (angle, x_m, tilt) in
+            [(2.0 * quarter, 0.03, 0.0), (2.0 * quarter, 0.0, 0.2), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
+        {
+            assert_eq!(turned(angle, x_m, tilt), None);
+        }
+    }
 }

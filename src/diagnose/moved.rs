@@ -57,6 +57,7 @@ impl Kind for BodyMoved {
         match self.moved {
             Moved::Plate { .. } => Code::PlateMoved,
             Moved::Camera { .. } => Code::CameraMoved,
+            Moved::Images { .. } => Code::ImagesTurned,
             Moved::Zero { .. } => Code::ZeroMoved,
             Moved::Readings { .. } => Code::JointReadingsWrong,
         }
@@ -77,6 +78,9 @@ impl Kind for BodyMoved {
             Moved::Plate { distance_m, angle_rad } | Moved::Camera { distance_m, angle_rad } => {
                 vec![Quantity::new("distance", distance_m, "m"), Quantity::new("angle", angle_rad, "rad")]
             }
+            Moved::Images { turn_rad, distance_m } => {
+                vec![Quantity::new("turn", turn_rad, "rad"), Quantity::new("distance", distance_m, "m")]
+            }
             Moved::Zero { kind, offset, .. } => vec![Quantity::new("offset", offset, kind.units()[0])],
             Moved::Readings { .. } => Vec::new(),
         }
@@ -86,6 +90,7 @@ impl Kind for BodyMoved {
         match &self.moved {
             Moved::Plate { .. } => "plate".into(),
             Moved::Camera { .. } => "camera on its mount".into(),
+            Moved::Images { .. } => "images".into(),
             Moved::Zero { joint, .. } | Moved::Readings { joint: Some(joint), .. } => joint.clone(),
             Moved::Readings { joint: None, .. } => "joint readings".into(),
         }
@@ -104,6 +109,11 @@ impl Kind for BodyMoved {
                 "was moved between {before} and {after}: {images}, agree on a place {:.1} mm and {:.1} mrad from that of the others",
                 1e3 * distance_m,
                 1e3 * angle_rad
+            ),
+            Moved::Images { turn_rad, distance_m } => format!(
+                "are turned by {:.0} degrees between {before} and {after}: {images}, fit the others when they are turned back (to {:.1} mm of the place of the camera)",
+                turn_rad.to_degrees().abs(),
+                1e3 * distance_m
             ),
             Moved::Zero { kind, offset, or, .. } => format!(
                 "its zero was moved between {before} and {after}: {images}, agree on {:+.3} {} from that of the others: the joint was mastered anew, its encoder or belt slipped{}",
@@ -128,6 +138,9 @@ impl Kind for BodyMoved {
             }
             Moved::Camera { .. } => {
                 "put the images after the move into a series of their own with another [camera] mounting"
+            }
+            Moved::Images { .. } => {
+                "turn these images back, and see what turns them (camera, driver, viewer); another mounting is right only where the camera itself was turned, as its lens is then turned with it"
             }
             Moved::Zero { .. } => "identify the robot from the stops of one mastering, before the move or after it",
             Moved::Readings { .. } => "correct the readings of these stops, or leave their rows out",

@@ -305,6 +305,7 @@ codes! {
         JointNoiseContradicted "joint_noise_contradicted" "the data show another joint noise than the stated one",
         PlateMoved "plate_moved" "the plate was moved: images were left out",
         CameraMoved "camera_moved" "the camera was moved on its mount: images were left out",
+        ImagesTurned "images_turned" "images are turned about the optical axis against the others: they were left out",
         PlateDisplaced "plate_displaced" "the plate stands a little elsewhere from some image on",
         CameraDisplaced "camera_displaced" "the camera sits a little elsewhere from some image on",
         PlateDrifts "plate_drifts" "the plate creeps all through the series",

@@ -270,3 +270,23 @@ fn what_breaks_a_series_is_named() {
         assert_named(&series, Code::JointReadingsWrong, &["joint_a2", &good.stops[23].image]);
     }
 }
+
+/// Pictures of the camera turned by half a turn about the point that its axis meets.
+#[test]
+fn images_that_are_turned_are_no_moved_camera() {
+    let made = seen(CameraMount::Hand, 24, 3);
+    let [cx, cy] = [2, 3].map(|k| made.truth.camera.parameters[k]);
+    for from in [12, 18] {
+        let mut turned = made.clone();
+        for image in &mut turned.observations[from..] {
+            image.observations.iter_mut().for_each(|o| o.uv = [2.0 * cx - o.uv[0], 2.0 * cy - o.uv[1]]);
+        }
+        let series = measured(&turned, &chain());
+        assert_named(&series, Code::ImagesTurned, &[series.stops[from].image.as_str()]);
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        if let Err(said) = identify(chain(), &[series], &options) {
+            let turn = said.quantities.iter().find(|q| q.name == "turn").unwrap().value;
+            assert!((turn - std::f64::consts::PI).abs() < 1e-9, "{said}");
+        }
+    }
+}
