@@ -1,6 +1,7 @@
 //! Are there enough images of the robot?
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::lost_images::LostImages;
 use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
@@ -12,12 +13,17 @@ pub struct FewImages {
     pub images: usize,
     /// True where nothing but trackers and contacts measured: stops of the robot are counted.
     pub are_stops: bool,
+    /// What cost many images, if that is so.
+    pub lost: Option<LostImages>,
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<FewImages> {
     let are_stops = setting.on_robot == 0;
     let images = if are_stops { fit.problem.used_stops().len() } else { setting.on_robot };
-    (images < setting.limits.few_images).then_some(FewImages { images, are_stops })
+    (images < setting.limits.few_images).then(|| {
+        let lost = LostImages::of(&fit.problem, setting.limits);
+        FewImages { images, are_stops, lost }
+    })
 }
 
 impl Kind for FewImages {
@@ -34,7 +40,8 @@ impl Kind for FewImages {
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        vec![Quantity::new("images", self.images as f64, "1")]
+        let images = Quantity::new("images", self.images as f64, "1");
+        [images].into_iter().chain(self.lost.as_ref().map(LostImages::quantity)).collect()
     }
 
     fn place(&self) -> String {
@@ -50,6 +57,7 @@ impl Kind for FewImages {
     }
 
     fn remedy(&self) -> String {
-        "take 30 to 50 stops that move every joint through its range".into()
+        let more = "take 30 to 50 stops that move every joint through its range";
+        self.lost.as_ref().map_or_else(|| more.to_owned(), |lost| format!("{}; {more}", lost.remedy()))
     }
 }

@@ -2,8 +2,8 @@
 
 use robotcal::assess::WorkspacePoint;
 use robotcal::diagnose::Finding;
-use robotcal::identify::{JointNoise, Options, identify};
-use robotcal::problem::MeasuredSeries;
+use robotcal::identify::{JointNoise, Options, RobotModel, identify};
+use robotcal::problem::{ImageRejection, MeasuredSeries};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{WorldRequest, series};
 use robotcal::study::measured;
@@ -251,6 +251,24 @@ fn rows_that_were_exchanged_are_named_with_one_another() {
     assert_eq!(left_out_and_named(2e-5, &[(2, 7), (7, 11), (11, 2)]), (vec![2, 7, 11], vec![vec![2, 11, 7]]));
     // Readings that are nobody's.
     assert_eq!(left_out_and_named(2e-5, &[(2, 7)]), (vec![2], vec![]));
+}
+
+#[test]
+fn what_cost_half_of_the_images_is_said_beside_their_number() {
+    let chain = chain();
+    let world = WorldRequest { images: 24, ..request(&chain) };
+    let mut series = measured(&series(&world).unwrap(), &chain);
+    for stop in series.stops.iter_mut().step_by(2) {
+        stop.observations.clear();
+        let what = "is 640 x 512 px, but 12 images are 1280 x 1024 px".to_owned();
+        stop.left_out = Some(ImageRejection::Unusable { why: Code::ImageSizeDiffers, what });
+    }
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let solution = identify(chain, &[series], &options).unwrap();
+    let found = solution.findings.iter().find(|f| f.code() == Code::FewImages).unwrap();
+    let values: Vec<f64> = found.quantities().iter().map(|q| q.value).collect();
+    assert_eq!(values, [12.0, 12.0], "{found:?}");
+    assert!(found.remedy().contains(Code::ImageSizeDiffers.name()), "{found}");
 }
 
 #[test]
