@@ -1,6 +1,6 @@
 //! Did focus or zoom change within the series? Every image votes for a focal length of its own.
 
-use super::kind::{CheckContext, Kind, Quantity, Subject};
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::fit::FocalLength;
 use crate::problem::Problem;
@@ -14,8 +14,10 @@ pub struct FocusChange {
     pub image: String,
     /// Relative change of the focal length.
     pub change: f64,
-    /// Its size in standard errors, from the scatter of the images.
+    /// Its size in standard errors, from the scatter of the images, or by the poses of all.
     pub significance: f64,
+    /// Gate, or a note where it explains little of the joint noise.
+    pub weight: Weight,
 }
 
 /// The most significant change along the order of the images of a camera; of the first camera that has one.
@@ -42,7 +44,8 @@ pub(super) fn check(problem: &Problem, setting: &CheckContext) -> Option<FocusCh
         }
         if let Some((significance, split, change)) = best {
             let image = problem.images[votes[split].0].name.clone();
-            return Some(FocusChange { camera: name.clone(), image, change, significance });
+            let (camera, weight) = (name.clone(), Weight::Gate);
+            return Some(FocusChange { camera, image, change, significance, weight });
         }
     }
     None
@@ -58,6 +61,10 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
 impl Kind for FocusChange {
     fn code(&self) -> Code {
         Code::FocusChanged
+    }
+
+    fn weight(&self) -> Weight {
+        self.weight
     }
 
     fn subjects(&self) -> Vec<Subject> {

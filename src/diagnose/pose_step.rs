@@ -12,9 +12,13 @@
 //! left, and with the squares `P` of the robot's errors over their priors, which are as many as it took: a step may take up either. `D / (R + P)`
 //! has a beta distribution where noise is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them:
 //! the step must also explain most of `R`; one that explains less, but much, is a doubt.
+//!
+//! Another focal length looks like a camera that moved along its axis, as far as all images are taken from one distance: where a step of it falls by
+//! more than that of plate or camera, it is named instead.
 
 use super::displaced::{Carried, Displaced, Displacement};
 use super::finding::Finding;
+use super::focus::{self, FocusChange};
 use super::kind::{CheckContext, Weight};
 use super::step_candidates::{Changed, Order, Shown};
 use super::step_rows::{Linear, Part, Step};
@@ -47,6 +51,9 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
         let log_chance = best.log_chance + (tried.len() as f64).ln();
         if log_chance > limits.displaced_false_alarms.ln() {
             break;
+        }
+        if let Some(refocused) = linear.refocused(problem, &best, limits.displaced_images) {
+            best = refocused;
         }
         let Some((next, step)) = linear.with(problem, &best) else { break };
         linear = next;
@@ -152,6 +159,9 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
         let (stops, share) = (images, step.share);
         return Some(ZeroMoved { joint, kind, series, displacement, stops, offset, share, weight }.into());
     }
+    if let Changed::Focal(camera) = step.changed {
+        return refocused(step, fit, camera, images.into_iter().next()?, explains_most, setting);
+    }
     let sized = |from: usize| {
         let axes = from..(from + 3).min(step.change.len());
         let variance: f64 = axes.clone().map(|k| step.covariance[(k, k)]).sum();
@@ -177,6 +187,27 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
         }
         .into(),
     )
+}
+
+/// Said where the images by themselves do not say so.
+fn refocused(
+    step: &Step,
+    fit: &Fit,
+    camera: usize,
+    image: String,
+    explains_most: bool,
+    setting: &CheckContext,
+) -> Option<Finding> {
+    let (problem, focal_px) = (&fit.problem, &fit.state.cameras[camera].parameters);
+    if focus::check(problem, setting).is_some() {
+        return None;
+    }
+    let relative = |k: usize| step.change[k] / focal_px[k];
+    let sigma = |k: usize| step.covariance[(k, k)].sqrt() / focal_px[k];
+    let (change, sigma) = (0.5 * (relative(0) + relative(1)), sigma(0).max(sigma(1)));
+    let significance = change.abs() / sigma.max(f64::MIN_POSITIVE);
+    let weight = if explains_most { Weight::Gate } else { Weight::Note };
+    Some(FocusChange { camera: problem.cameras[camera].clone(), image, change, significance, weight }.into())
 }
 
 /// What stands elsewhere, and the name of its mounting, tracker or target.

@@ -18,6 +18,8 @@ pub(super) enum Changed {
     Target(usize),
     /// The zero of a reading.
     Zero(usize),
+    /// The focal lengths of a camera.
+    Focal(usize),
 }
 
 impl Changed {
@@ -32,6 +34,7 @@ impl Changed {
             Self::Instrument(i) => told(&layout.instruments[i]),
             Self::Target(b) => told(&layout.bodies[b]),
             Self::Zero(reading) => zeros[reading].map_or(0..0, |c| c..c + 1),
+            Self::Focal(c) => layout.cameras[c].start..layout.cameras[c].start + 2,
         }
     }
 }
@@ -76,6 +79,7 @@ impl Shown {
             (_, Changed::Zero(_)) => true,
             (Self::Image { index, .. }, Changed::Placement(p)) => problem.images[index].placement == p,
             (Self::Image { index, .. }, Changed::Mounting(m)) => problem.images[index].mounting == m,
+            (Self::Image { index, .. }, Changed::Focal(c)) => problem.images[index].camera == c,
             (Self::Measurement(k), Changed::Instrument(i)) => problem.body_measurements[k].instrument == i,
             (Self::Measurement(k), Changed::Target(b)) => problem.body_measurements[k].body == b,
             _ => false,

@@ -3,51 +3,71 @@
 use std::rc::Rc;
 
 use super::step_candidates::{Candidate, Changed, Order, Shown, stride};
-use super::step_rows::Linear;
+use super::step_rows::{Linear, Step};
 use crate::problem::{InstrumentKind, Problem};
 use crate::series::CameraMount;
 
 impl Linear {
     /// Ways to divide the stops, with at least so many of them on either side.
     pub(super) fn candidates(&self, problem: &Problem, fewest: usize) -> Vec<Candidate> {
+        self.what_may_change(problem).into_iter().flat_map(|changed| self.divisions(problem, changed, fewest)).collect()
+    }
+
+    /// Those by one change.
+    fn divisions(&self, problem: &Problem, changed: Changed, fewest: usize) -> Vec<Candidate> {
         let mut all = Vec::new();
-        let groups = 0..self.rows.iter().map(|r| r.group + 1).max().unwrap_or(0);
-        for changed in self.what_may_change(problem) {
-            if changed.columns(&problem.layout, &self.zeros).is_empty() {
-                continue;
-            }
-            let telling = |r: &usize| self.rows[*r].of(problem, changed).next().is_some();
-            let every: Vec<usize> = (0..self.rows.len()).filter(telling).collect();
-            for group in groups.clone() {
-                let rows: Vec<usize> = every.iter().copied().filter(|r| self.rows[*r].group == group).collect();
-                let elsewhere = every.len() - rows.len();
-                let mut divide = |order, rows: Vec<usize>| {
-                    let rows = Rc::new(rows);
-                    let (from, fewest) = match order {
-                        Order::Whole | Order::Drift => (0..1, 0),
-                        Order::Time | Order::Up(_) => (fewest..(rows.len() + 1).saturating_sub(fewest), fewest),
-                    };
-                    let from = from.rev().step_by(stride(rows.len()));
-                    all.extend(from.map(|from| Candidate { changed, order, group, rows: rows.clone(), from, fewest }));
+        if changed.columns(&problem.layout, &self.zeros).is_empty() {
+            return all;
+        }
+        let telling = |r: &usize| self.rows[*r].of(problem, changed).next().is_some();
+        let every: Vec<usize> = (0..self.rows.len()).filter(telling).collect();
+        for group in 0..self.rows.iter().map(|r| r.group + 1).max().unwrap_or(0) {
+            let rows: Vec<usize> = every.iter().copied().filter(|r| self.rows[*r].group == group).collect();
+            let elsewhere = every.len() - rows.len();
+            let mut divide = |order, rows: Vec<usize>| {
+                let rows = Rc::new(rows);
+                let (from, fewest) = match order {
+                    Order::Whole | Order::Drift => (0..1, 0),
+                    Order::Time | Order::Up(_) => (fewest..(rows.len() + 1).saturating_sub(fewest), fewest),
                 };
-                let by_weight = (0..3).filter(|_| self.is_carried(problem, changed, &rows));
-                for axis in by_weight {
-                    let mut rows = rows.clone();
-                    rows.sort_by(|a, b| {
-                        self.up(problem, changed, *a, axis).total_cmp(&self.up(problem, changed, *b, axis))
-                    });
-                    divide(Order::Up(axis), rows);
-                }
-                if rows.len() >= 2 * fewest {
-                    divide(Order::Drift, rows.clone());
-                }
-                if rows.len() >= fewest && elsewhere >= fewest {
-                    divide(Order::Whole, rows.clone());
-                }
-                divide(Order::Time, rows);
+                let from = from.rev().step_by(stride(rows.len()));
+                all.extend(from.map(|from| Candidate { changed, order, group, rows: rows.clone(), from, fewest }));
+            };
+            let by_weight = (0..3).filter(|_| self.is_carried(problem, changed, &rows));
+            for axis in by_weight {
+                let mut rows = rows.clone();
+                rows.sort_by(|a, b| {
+                    self.up(problem, changed, *a, axis).total_cmp(&self.up(problem, changed, *b, axis))
+                });
+                divide(Order::Up(axis), rows);
             }
+            if rows.len() >= 2 * fewest {
+                divide(Order::Drift, rows.clone());
+            }
+            if rows.len() >= fewest && elsewhere >= fewest {
+                divide(Order::Whole, rows.clone());
+            }
+            divide(Order::Time, rows);
         }
         all
+    }
+
+    /// The change of focus that explains more than a plate or a camera that moved once, if there is one: beyond what noise lets it, as it is
+    /// told by the single images as well.
+    pub(super) fn refocused(&self, problem: &Problem, moved: &Step, fewest: usize) -> Option<Step> {
+        let is_body = matches!(moved.changed, Changed::Placement(_) | Changed::Mounting(_));
+        let first = moved.shown.first().filter(|_| is_body && moved.order == Order::Time)?;
+        let Shown::Image { index, .. } = *first else { return None };
+        let mut tried = self.divisions(problem, Changed::Focal(problem.images[index].camera), fewest);
+        tried.retain(|c| c.order == Order::Time && c.group == moved.group);
+        let mut step = self.most(problem, &tried)?;
+        let by_chance = step.change.len() as f64;
+        if step.fall - by_chance <= moved.fall {
+            return None;
+        }
+        // What the images tell by themselves is no part of the squares of the poses.
+        (step.log_chance, step.fall) = (moved.log_chance, moved.fall);
+        Some(step)
     }
 
     fn what_may_change(&self, problem: &Problem) -> Vec<Changed> {

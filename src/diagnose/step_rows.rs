@@ -204,6 +204,12 @@ impl Linear {
         Some(best)
     }
 
+    /// The step that explains most.
+    pub(super) fn most(&self, problem: &Problem, tried: &[Candidate]) -> Option<Step> {
+        let covariance = SymmetricFactor::new(&self.information).ok()?.inverse();
+        self.least(problem, tried.iter(), &covariance, |fall| -fall.cost)
+    }
+
     /// The step of which `score` is least; where several are alike, the first.
     fn least<'a>(
         &self,

@@ -84,6 +84,26 @@ fn a_camera_bumped_by_a_millimetre_is_named() {
     assert_moved_by_a_millimetre(told(&solved(&series)), Carried::CameraInHand, &series.stops.stops[15].image);
 }
 
+/// By too little for single images to tell it, and as far as a camera that moves along its axis by a third of a millimetre.
+#[test]
+fn a_change_of_focus_is_no_moved_camera() {
+    let mut series = seen(CameraMount::Hand, 24, 4);
+    let [cx, cy] = [2, 3].map(|k| series.truth.camera.parameters[k]);
+    let longer = 0.8e-3;
+    for image in &mut series.observations[12..] {
+        for o in &mut image.observations {
+            o.uv = [o.uv[0] + longer * (o.uv[0] - cx), o.uv[1] + longer * (o.uv[1] - cy)];
+        }
+    }
+    let solution = solved(&series);
+    let found: Vec<&Finding> = solution.findings.iter().filter(|f| f.code() == Code::FocusChanged).collect();
+    let [Finding::FocusChange(found)] = found[..] else { panic!("{:?}", solution.findings) };
+    assert_eq!(found.image, series.stops.stops[12].image, "{found:?}");
+    assert!((found.change - longer).abs() < 0.3 * longer, "{found:?}");
+    let displaced = |f: &Finding| matches!(f, Finding::Displaced(_)) && f.fails();
+    assert!(!solution.findings.iter().any(displaced), "{:?}", solution.findings);
+}
+
 #[test]
 fn a_camera_turned_once_is_not_called_loose() {
     let mut series = seen(CameraMount::Hand, 24, 5);
