@@ -41,7 +41,9 @@ mod tests {
     #[test]
     fn a_call_means_the_routine_of_its_file_else_all_that_others_offer() {
         let mut all = Routines::default();
-        [(0, true), (1, false), (2, false)].map(|(file, is_local)| all.declare("A".to_owned(), file, is_local));
+        [(0, true), (1, false), (2, false)]
+            .into_iter()
+            .for_each(|(file, local)| all.declare("A".to_owned(), file, local));
         all.declare("B".to_owned(), 0, true);
         let meant = |name: &str, file| all.meant(name, file);
         assert_eq!([0, 1].map(|file| meant("A", file)), [0, 1].map(|file| vec![in_scope("A", file)]));

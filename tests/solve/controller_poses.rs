@@ -296,6 +296,29 @@ fn mistakes_in_the_poses_are_not_blamed_on_right_angles_of_the_first_stop() {
     }
 }
 
+/// What a controller shows with a tool set. A robot that is as in its model would hide any of them in the hand-eye transform.
+#[test]
+fn poses_of_a_tool_are_told_from_those_of_the_flange() {
+    let (_, readings, poses) = by_joints();
+    let deg: Vec<f64> = readings[0].iter().map(|q| q.to_degrees()).collect();
+    for z in [0.0, 0.12] {
+        let tool = Pose::exp(&Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0));
+        let shown: Vec<(String, Pose)> = poses.iter().map(|(image, pose)| (image.clone(), *pose * tool)).collect();
+        let folder = series("quaternion", "qx,qy,qz,qw", &shown, quaternion);
+        let path = folder.path().join("series.toml");
+        fs::write(&path, fs::read_to_string(&path).unwrap() + &format!("first_stop_deg = {deg:?}\n")).unwrap();
+        let inputs = Inputs::read(&urdf(), &[folder.path().to_path_buf()], Ends::default()).unwrap();
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        let calibration = Calibration::of(inputs.observe(&|_, _| ()).unwrap(), &options).unwrap();
+        let told = calibration.findings().iter().find(|f| f.code() == Code::PosesOfTool);
+        assert_eq!(told.is_some(), z > 0.0, "{told:?}");
+        for (quantity, true_m) in told.iter().flat_map(|f| f.quantities()).take(3).zip([0.0, 0.0, z]) {
+            let sigma = quantity.sigma.unwrap();
+            assert!(sigma < 0.02 && (quantity.value - true_m).abs() < 4.0 * sigma, "{quantity:?}");
+        }
+    }
+}
+
 #[test]
 fn poses_do_not_tell_the_readings_of_seven_joints() {
     let (_, _, poses) = by_joints();
