@@ -136,7 +136,8 @@ fn a_copy_has_what_was_copied_whatever_that_gets_later() {
     let cell = Cell::kuka(185);
     assert_all_meet(&cell, "P2=@\nP1=P2\nP2=@\nLIN P1\nLIN P2\n", "P2=");
     assert_all_meet(&cell, "P2=@\nP1=P2\nP3=P1\nP1=@\nP2=@\nLIN P1\nLIN P2\nLIN P3\n", "P");
-    assert_all_meet(&cell, "INIT( )\nP1=P2\nLIN P1\nEND\nDEF INIT( )\nP2=@\n", "P2=");
+    let set_below = "INIT( )\nP1=P2\nGO( )\nEND\nDEF INIT( )\nP2=@\nEND\nDEF GO( )\nPTP <N>\nLIN P1\n";
+    assert_all_meet(&cell, set_below, "P2=");
     for frame in ["$BASE", "$TOOL"] {
         assert_all_meet(&cell, &format!("F1={NONE}\nF2=F1\nF1={OTHER}\n{frame}=F2\nLIN @\n"), "LIN");
         assert_all_meet(&cell, &format!("F1={OTHER}\nF2=F1\nF1={NONE}\n{frame}=F1\nLIN @\n"), "LIN");
