@@ -6,7 +6,7 @@ use super::Task;
 use super::moves::{targets_of, writes_found};
 use super::statements::{CONTROL, DECLARE, OPERATORS, behind_header, is_control, statement_end};
 use super::switching::{ROUTINES, routine_name, words_before_name};
-use super::value::{TYPES, element};
+use super::value::{TYPES, element, is_set};
 use crate::programs::references::{Call, Calling, Given, Parameter, Passing, References, Which, parts, variable};
 use crate::programs::scan::{Reader, TokenKind};
 
@@ -135,21 +135,6 @@ fn parameters(reader: &Reader<'_>, open: usize) -> Vec<Parameter> {
         }
     }
     all
-}
-
-/// True where `:=` stands behind the name, its index and its components on which the reader stands.
-pub(super) fn is_set(reader: &mut Reader<'_>) -> bool {
-    let start = reader.at;
-    let is_switch = reader.ahead_is_mark(-1, b'\\');
-    reader.at += 1;
-    element(reader, String::new());
-    while reader.take_mark(b'.') {
-        reader.at += 1;
-        element(reader, String::new());
-    }
-    let is_set = reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');
-    reader.at = start;
-    is_set && !is_switch
 }
 
 /// Notes the routines of a file, what they set, and what they call.

@@ -31,14 +31,13 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
-use calls::is_set;
 use moves::{is_of_joints, is_to_joints};
 use scopes::Scopes;
 use switched::Watched;
 use switching::{Now, Switching};
 use uses::Use;
 use value::{
-    Displacement, NO_AXIS, Node, TYPES, array_of, check, computed, element, foreign_axis, frame, node, numbers,
+    Displacement, NO_AXIS, Node, TYPES, array_of, check, computed, element, foreign_axis, frame, is_set, node, numbers,
     undeclared,
 };
 

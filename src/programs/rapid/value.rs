@@ -106,6 +106,21 @@ pub(super) fn element(reader: &mut Reader<'_>, name: String) -> String {
     format!("{name}{{{}}}", number.map_or(String::new(), |(value, _)| value.to_string()))
 }
 
+/// True where `:=` stands behind the name, its index and its components on which the reader stands.
+pub(super) fn is_set(reader: &mut Reader<'_>) -> bool {
+    let start = reader.at;
+    let is_switch = reader.ahead_is_mark(-1, b'\\');
+    reader.at += 1;
+    element(reader, String::new());
+    while reader.take_mark(b'.') {
+        reader.at += 1;
+        element(reader, String::new());
+    }
+    let is_set = reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');
+    reader.at = start;
+    is_set && !is_switch
+}
+
 /// The array of the name of an element.
 pub(super) fn array_of(name: &str) -> Option<&str> {
     name.split_once('{').map(|(array, _)| array)

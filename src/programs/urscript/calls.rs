@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use super::routines::called;
 use super::{BLOCKS, MOVES, Script, Value};
 use crate::programs::field::FieldPlace;
 use crate::programs::program::Left;
 use crate::programs::reason::{LeftReason, Why};
-use crate::programs::routines::Routines;
 use crate::programs::scan::{Reader, TokenKind};
 
 /// Calls behind which the robot stands elsewhere; true where it keeps its posture, because the tool moves a little or on a path.
@@ -78,24 +78,6 @@ struct Routine {
     parameters: Vec<Vec<u8>>,
     /// Calls that are given one of its parameters.
     hands_on_to: Vec<String>,
-}
-
-/// Notes the routines of a file.
-pub(super) fn routines_in(mut reader: Reader<'_>, all: &mut Routines) {
-    while !reader.done() {
-        if matches!(reader.word(), Some(b"def" | b"thread"))
-            && let Some(name) = called(&reader, 1)
-        {
-            all.declare(name, reader.index, false);
-        }
-        reader.at += 1;
-    }
-}
-
-/// The word some tokens on.
-fn called(reader: &Reader<'_>, ahead: isize) -> Option<String> {
-    let token = reader.ahead(ahead).filter(|t| t.kind == TokenKind::Word)?;
-    Some(String::from_utf8_lossy(reader.text(token)).into_owned())
 }
 
 /// Name and closing bracket of the call on whose name the reader stands; methods of other computers (`camera.look(..)`) cannot move the robot.

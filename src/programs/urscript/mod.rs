@@ -4,6 +4,7 @@
 mod active;
 mod arguments;
 mod calls;
+mod routines;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -81,11 +82,11 @@ struct Argument {
 
 /// Reads scripts; each file is a program of its own.
 pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
-    let mut routines = Routines::default();
+    let mut named = Routines::default();
     for (index, file) in files.iter().enumerate() {
-        calls::routines_in(Reader::new(file, index, DIALECT)?, &mut routines);
+        routines::routines_in(Reader::new(file, index, DIALECT)?, &mut named);
     }
-    let program = settled(|known| reading(&files, &routines, setting, known))?;
+    let program = settled(|known| reading(&files, &named, setting, known))?;
     Ok(Program { files, ..program })
 }
 
