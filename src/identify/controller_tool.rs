@@ -32,6 +32,8 @@ const STARTS_M: [f64; 3] = [0.0, 0.15, -0.15];
 const STEPS: usize = 12;
 /// Step of numerical derivatives, m and rad.
 const DIFFERENCE: f64 = 2e-3;
+/// Damping beyond which no step gains anything.
+const MOST_DAMPING: f64 = 1e3;
 /// A step that gains less of the cost ends the search.
 const GAINED: f64 = 1e-4;
 
@@ -169,7 +171,7 @@ impl<'a> Search<'a> {
         for _ in 0..STEPS {
             let (information, gradient) = self.reduced(&tried)?;
             let mut gained = 0.0;
-            while damping < 1e3 {
+            while damping < MOST_DAMPING {
                 let damped = information + Matrix6::from_diagonal(&information.diagonal().map(|d| damping * d + 1.0));
                 let step = damped.cholesky()?.solve(&-gradient);
                 match self.at(tried.tool + step).filter(|next| next.cost < tried.cost) {

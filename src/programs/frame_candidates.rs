@@ -1,10 +1,48 @@
 //! Which of the frames of a program is the one that was measured: at most one of them is.
 
-use super::measured_frames::{MeasuredTool, SameFrames};
+use nalgebra::{Matrix3, Vector3};
+
 use crate::geom::Pose;
 
 /// Frames that differ by no more than this (m, rad) are one, written with few digits.
 const ONE_FRAME: (f64, f64) = (1e-4, 1e-3);
+
+/// A tool as it was measured on a robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MeasuredTool {
+    /// Its point in the frame of the flange, m; it is turned as the program says.
+    Point(Vector3<f64>),
+    /// `flange_from_tool`.
+    Pose(Pose),
+}
+
+impl MeasuredTool {
+    pub(super) fn point(&self) -> Vector3<f64> {
+        match self {
+            Self::Point(point) => *point,
+            Self::Pose(pose) => pose.translation,
+        }
+    }
+
+    /// `flange_from_tool` where this is taken for `other`: points tell no turn, so that none is made between them.
+    pub(super) fn onto(&self, other: &Self) -> Pose {
+        match (self, other) {
+            (Self::Pose(a), Self::Pose(b)) => *a * b.inverse(),
+            _ => Pose::new(Matrix3::identity(), self.point() - other.point()),
+        }
+    }
+}
+
+/// Distance (m) and angle (rad) from the program's frames to the measured ones beyond which they are not the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SameFrames {
+    /// Of work objects.
+    pub work: (f64, f64),
+    /// Of tools.
+    pub tool: (f64, f64),
+    /// Of several frames of a program within them, how many times nearer than the next one the nearest must be to count as the measured one.
+    pub clearly_nearer: f64,
+}
 
 /// The measured frame, and what is near it.
 #[derive(Debug, Clone, Copy)]
@@ -20,7 +58,7 @@ impl Reference {
     /// A measured tool.
     pub fn tool(measured: MeasuredTool, same: &SameFrames) -> Self {
         let (pose, is_turned) = match measured {
-            MeasuredTool::Point(point) => (Pose::new(nalgebra::Matrix3::identity(), point), false),
+            MeasuredTool::Point(point) => (Pose::new(Matrix3::identity(), point), false),
             MeasuredTool::Pose(pose) => (pose, true),
         };
         Self { pose, limits: same.tool, is_turned }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::frame_candidates::{Candidates, Reference};
+use super::frame_candidates::{Candidates, MeasuredTool, Reference, SameFrames};
 use super::program::{Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
@@ -11,32 +11,6 @@ use crate::geom::Pose;
 pub trait KnownError: std::fmt::Debug + Sync {
     /// Where the tool is beside where the model has it, at readings, along the axes of the base, m.
     fn error_m(&self, readings: &[f64]) -> Vector3<f64>;
-}
-
-/// A tool as it was measured on a robot.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum MeasuredTool {
-    /// Its point in the frame of the flange, m; it is turned as the program says.
-    Point(Vector3<f64>),
-    /// `flange_from_tool`.
-    Pose(Pose),
-}
-
-impl MeasuredTool {
-    pub(super) fn point(&self) -> Vector3<f64> {
-        match self {
-            Self::Point(point) => *point,
-            Self::Pose(pose) => pose.translation,
-        }
-    }
-
-    /// `flange_from_tool` where this is taken for `other`: points tell no turn, so that none is made between them.
-    fn onto(&self, other: &Self) -> Pose {
-        match (self, other) {
-            (Self::Pose(a), Self::Pose(b)) => *a * b.inverse(),
-            _ => Pose::new(Matrix3::identity(), self.point() - other.point()),
-        }
-    }
 }
 
 /// What was measured of the frames of one robot; what was not is as the program has it.
@@ -65,17 +39,6 @@ pub struct MeasuredFrames {
     pub unsaid: Option<Pose>,
     /// What says that two frames are the same.
     pub same: SameFrames,
-}
-
-/// Distance (m) and angle (rad) from the program's frames to the measured ones beyond which they are not the same.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SameFrames {
-    /// Of work objects.
-    pub work: (f64, f64),
-    /// Of tools.
-    pub tool: (f64, f64),
-    /// Of several frames of a program within them, how many times nearer than the next one the nearest must be to count as the measured one.
-    pub clearly_nearer: f64,
 }
 
 /// What becomes of the pose of the flange that a target means: `base * pose * tool`.

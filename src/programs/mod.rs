@@ -43,8 +43,9 @@ mod text_file;
 mod urscript;
 
 pub use compensate::{Correction, Models, Postures, TargetOutcome, compensate};
+pub use frame_candidates::{MeasuredTool, SameFrames};
 pub use language::{Language, read};
-pub use measured_frames::{KnownError, MeasuredFrames, MeasuredTool, RobotFrames, SameFrames};
+pub use measured_frames::{KnownError, MeasuredFrames, RobotFrames};
 pub use posture::Known;
 pub use program::{Left, Program, Target, TargetKind};
 pub use reason::{DeclaredPoint, LeftReason, Why};

@@ -98,6 +98,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/computed_postures.rs TURNS", "most iterations"),
     ("identify/controller_tool.rs DIFFERENCE", "step of a difference quotient"),
     ("identify/controller_tool.rs GAINED", "end of a search"),
+    ("identify/controller_tool.rs MOST_DAMPING", "end of a search"),
     ("identify/controller_tool.rs MOST_STOPS", "where some stops do"),
     ("identify/controller_tool.rs STARTS_M", "starts of a search"),
     ("identify/controller_tool.rs STEPS", "most iterations"),

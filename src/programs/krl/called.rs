@@ -5,7 +5,8 @@ use std::ops::Range;
 use super::aggregate::Aggregate;
 use super::calls::{WORDS, given, is_beside, routine_name};
 use super::frames::FrameIs;
-use super::motions::{MOVES, RELATIVE, begins_spline};
+use super::given::Given;
+use super::moves::{MOVES, RELATIVE, begins_spline};
 use super::reads::{is_still, reads};
 use super::{AXIS_NAMES, Module, POSE_NAMES, Value};
 use crate::programs::reason::{LeftReason, Why};
@@ -19,15 +20,6 @@ const SENSOR_ENDS: [&str; 2] = ["RSI_OFF", "ST_OFF"];
 const SENSOR_MOVES: [&str; 2] = ["RSI_MOVECORR", "ST_SKIPSENS"];
 /// Arrays of the controller that hold frames.
 const FRAMES: [&str; 2] = ["BASE_DATA[", "TOOL_DATA["];
-
-/// A variable that a routine in none of the files is given.
-#[derive(Debug)]
-pub(super) struct Given {
-    pub name: String,
-    pub routine: String,
-    /// File and line of what it held, where a statement of the text above had set it.
-    pub place: Option<(usize, usize)>,
-}
 
 /// True for numbers that may be a position.
 fn is_position(aggregate: &Aggregate) -> bool {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::aggregate::index;
 use super::assigned::assigned;
-use super::motions::{MOVES, begins_spline};
+use super::moves::{MOVES, begins_spline};
 use crate::programs::references::{Calling, Given, Parameter, Passing, References, Which, parts};
 use crate::programs::routines::Routines;
 use crate::programs::scan::{Reader, TokenKind};

@@ -1,13 +1,7 @@
 //! Copies of variables: `P1=P2` gives what `P2` holds there, whatever it gets later.
 
-use std::collections::BTreeMap;
-
 use super::{Module, Value};
 use crate::programs::reason::{LeftReason, Why};
-
-/// Names that a routine has copied before any statement of the text above gave them a value, with their copies.
-#[derive(Debug, Default)]
-pub(super) struct Copies(BTreeMap<String, Vec<String>>);
 
 impl Module<'_> {
     /// What a statement gives `name`.
@@ -18,7 +12,7 @@ impl Module<'_> {
         match held {
             // A routine further on in the text may give it a value before.
             Err(why) if why.reason == LeftReason::Undeclared => {
-                self.copies.0.entry(other.clone()).or_default().push(name.to_owned());
+                self.copies.entry(other.clone()).or_default().push(name.to_owned());
                 value
             }
             held => Value::Copied(held),
@@ -27,7 +21,7 @@ impl Module<'_> {
 
     /// Copies of a name that gets its value behind them, in the same routine: what it held before, the text does not tell.
     fn outdated(&mut self, name: &str) {
-        for copy in self.copies.0.remove(name).into_iter().flatten() {
+        for copy in self.copies.remove(name).into_iter().flatten() {
             let words = format!("{copy} has what {name} held before it was set: the text does not tell what");
             let why = Why::of(&copy, LeftReason::Computed, words);
             if matches!(self.values.get(&copy), Some(Value::Name(other)) if other == name) {

@@ -7,7 +7,9 @@ mod called;
 mod calls;
 mod copies;
 mod frames;
+mod given;
 mod motions;
+mod moves;
 mod orientation;
 mod reads;
 mod scopes;
@@ -20,11 +22,10 @@ use std::path::Path;
 
 use aggregate::{Aggregate, index};
 use assigned::{Assigned, assigned};
-use called::Given;
 use calls::{is_beside, routine_name};
-use copies::Copies;
 use frames::{Active, FrameIs, Frames, OwnFrames};
-use motions::{MOVES, RELATIVE, begins_spline};
+use given::Given;
+use moves::{MOVES, RELATIVE, begins_spline};
 use scopes::Scopes;
 use uses::Uses;
 
@@ -112,7 +113,7 @@ fn reading(
         path_data: None,
         spline: None,
         routines,
-        copies: Copies::default(),
+        copies: BTreeMap::new(),
         given: Vec::new(),
         way: Itinerary::new(),
     };
@@ -167,8 +168,8 @@ struct Module<'a> {
     spline: Option<OwnFrames>,
     /// Routines in the files.
     routines: Routines,
-    /// Copies of names that had no value yet.
-    copies: Copies,
+    /// Names that the routine has copied before any statement of the text above gave them a value, with their copies.
+    copies: BTreeMap<String, Vec<String>>,
     /// Variables that routines in none of the files are given.
     given: Vec<Given>,
     way: Itinerary,
@@ -314,7 +315,7 @@ impl Module<'_> {
             "DEF" | "DEFFCT" | "GLOBAL" => {
                 let Some(name) = routine_name(reader) else { return false };
                 self.start_afresh();
-                self.copies = Copies::default();
+                self.copies = BTreeMap::new();
                 self.flow.routine_begins(name, &mut self.now, &unset());
             }
             "RETURN" => self.flow.returns(&self.now),

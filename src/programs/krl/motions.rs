@@ -9,23 +9,12 @@ use crate::programs::program::{MeantPosture, Target, TargetKind, Understood};
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::Reader;
 
-/// Motions and how many targets they have.
-pub(super) const MOVES: [(&str, usize); 7] =
-    [("PTP", 1), ("LIN", 1), ("CIRC", 2), ("SPTP", 1), ("SLIN", 1), ("SCIRC", 2), ("SPL", 1)];
-pub(super) const RELATIVE: [&str; 7] =
-    ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL", "SPL_REL"];
 /// Motions of the joints; the others lead the tool along a path.
 const OF_JOINTS: [&str; 2] = ["PTP", "SPTP"];
 /// Variables of the controller that say where the robot stands.
 const STANDS: [&str; 2] = ["$AXIS_ACT", "$POS_ACT"];
 /// Components of a pose; status and turn are those behind them.
 const COMPONENTS: usize = 6;
-
-/// True for the header of a spline block: `SPLINE`, `PTP_SPLINE`, `PTP SPLINE`.
-pub(super) fn begins_spline(reader: &Reader<'_>) -> bool {
-    let is = |word| reader.ahead_is_word(0, word);
-    is("SPLINE") || is("PTP_SPLINE") || (is("PTP") && reader.ahead_is_word(1, "SPLINE"))
-}
 
 /// The posture that a motion means: on paths of the tool, status and turn are not heeded.
 fn posture_of(motion: &str, stated: MeantPosture) -> MeantPosture {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::aggregate::index;
 use super::assigned::assigned;
-use super::motions::{MOVES, begins_spline};
+use super::moves::{MOVES, begins_spline};
 use crate::programs::scan::{Reader, TokenKind};
 
 /// Variables of the controller that hold frames.
