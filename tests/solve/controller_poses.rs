@@ -301,7 +301,7 @@ fn mistakes_in_the_poses_are_not_blamed_on_right_angles_of_the_first_stop() {
 fn poses_of_a_tool_are_told_from_those_of_the_flange() {
     let (_, readings, poses) = by_joints();
     let deg: Vec<f64> = readings[0].iter().map(|q| q.to_degrees()).collect();
-    for z in [0.0, 0.12] {
+    for z in [0.0, 0.06] {
         let tool = Pose::exp(&Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0));
         let shown: Vec<(String, Pose)> = poses.iter().map(|(image, pose)| (image.clone(), *pose * tool)).collect();
         let folder = series("quaternion", "qx,qy,qz,qw", &shown, quaternion);
