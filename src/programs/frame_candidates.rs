@@ -94,10 +94,17 @@ pub(super) enum Candidates {
     Unmeasured,
     /// One of them may be the measured one, or none.
     Alone(Reference),
-    /// This one of several is.
-    Nearest(Reference, Pose),
+    /// Of several, this one is the measured one: stated as that, or clearly the nearest.
+    One(Reference, Pose, Chosen),
     /// Any of several may be: how far off the nearest two are, m.
     Several(Reference, [f64; 2]),
+}
+
+/// Why one of several frames is the measured one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Chosen {
+    Stated,
+    Nearest,
 }
 
 /// Why a frame is not the measured one.
@@ -105,6 +112,8 @@ pub(super) enum Candidates {
 pub(super) enum NotMeasured {
     /// Angle (rad) and distance (m) are beyond the limits.
     Apart(f64, f64),
+    /// Another one is stated as that, at this distance, m.
+    OtherStated(f64),
     /// Another one is nearer: their distances, m.
     OtherNearer(f64, f64),
     /// Others are about as near: the nearest two distances, m.
@@ -116,7 +125,7 @@ impl Candidates {
     pub fn of(frames: &[Pose], reference: Option<Reference>, stated: Option<Pose>, clearly_nearer: f64) -> Self {
         let Some(reference) = reference else { return Self::Unmeasured };
         let mut near: Vec<Pose> = Vec::new();
-        for frame in frames.iter().filter(|frame| reference.nearness(frame) <= 1.0) {
+        for frame in frames.iter().chain(&stated).filter(|frame| reference.nearness(frame) <= 1.0) {
             if !near.iter().any(|known| reference.are_one(known, frame)) {
                 near.push(*frame);
             }
@@ -125,9 +134,9 @@ impl Candidates {
         let is_stated = |frame: &&Pose| stated.is_some_and(|stated| reference.are_one(frame, &stated));
         match (near.iter().find(is_stated), near.as_slice()) {
             (_, [] | [_]) => Self::Alone(reference),
-            (Some(stated), _) => Self::Nearest(reference, *stated),
+            (Some(stated), _) => Self::One(reference, *stated, Chosen::Stated),
             (None, [first, second, ..]) if reference.nearness(first) * clearly_nearer < reference.nearness(second) => {
-                Self::Nearest(reference, *first)
+                Self::One(reference, *first, Chosen::Nearest)
             }
             (None, [first, second, ..]) => {
                 Self::Several(reference, [first, second].map(|frame| reference.apart(frame, &reference.pose).1))
@@ -137,7 +146,7 @@ impl Candidates {
 
     /// Whether a frame is the measured one.
     pub fn check(&self, own: &Pose) -> Result<(), NotMeasured> {
-        let (Self::Alone(reference) | Self::Nearest(reference, _) | Self::Several(reference, _)) = self else {
+        let (Self::Alone(reference) | Self::One(reference, ..) | Self::Several(reference, _)) = self else {
             return Ok(());
         };
         let (rad, m) = reference.apart(own, &reference.pose);
@@ -145,9 +154,10 @@ impl Candidates {
             return Err(NotMeasured::Apart(rad, m));
         }
         match self {
-            Self::Nearest(_, nearest) if !reference.are_one(own, nearest) => {
-                Err(NotMeasured::OtherNearer(m, reference.apart(nearest, &reference.pose).1))
-            }
+            Self::One(_, one, chosen) if !reference.are_one(own, one) => Err(match chosen {
+                Chosen::Stated => NotMeasured::OtherStated(reference.apart(own, one).1),
+                Chosen::Nearest => NotMeasured::OtherNearer(m, reference.apart(one, &reference.pose).1),
+            }),
             Self::Several(_, nearest) => Err(NotMeasured::Unclear(*nearest)),
             _ => Ok(()),
         }
@@ -163,6 +173,9 @@ impl NotMeasured {
                 1e3 * m,
                 rad.to_degrees()
             ),
+            Self::OtherStated(m) => {
+                format!("its {what} lies {:.1} mm from that of {option}, which is the measured one", 1e3 * m)
+            }
             Self::OtherNearer(own, nearest) => format!(
                 "its {what} lies {:.1} mm from the measured one, and another {what} of the program {:.1} mm: that one was measured (if not, state the one that was with {option})",
                 1e3 * own,

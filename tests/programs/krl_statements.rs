@@ -46,6 +46,7 @@ fn a_motion_to_a_variable_of_the_controller_leads_to_where_the_text_does_not_tel
             ("PTP $AXIS_HOME[1]\nLIN {Z 700}\n", 0, &[Undeclared, Incomplete]),
             ("PTP $AXIS_HOME[1]\nPTP @\n", 0, &[Undeclared, PostureUnknown]),
             ("$H_POS=XHOME\nPTP $H_POS\nLIN {Z 700}\n", 0, &[Undeclared, Incomplete]),
+            ("P1=@\n$H_POS=P1\nPTP $H_POS\nLIN {Z 700}\n", 2, &[]),
             ("LIN $POS_INT\nLIN {Z 700}\n", 0, &[Undeclared, Incomplete]),
             ("LIN $NULLFRAME\nLIN @\n", 0, &[Undeclared, PostureUnknown]),
             ("PTP $AXIS_HOME[1]\nPTP <N>\nLIN {Z 700}\n", 2, &[Undeclared]),
@@ -98,8 +99,9 @@ fn a_routine_in_none_of_the_files_may_move_the_robot() {
             ),
             ("SLIN @ WITH $VEL=SVEL_CP(0.2,,LP1),$CM[1]=USE_CM_PRO_VALUES(0)\nLIN {Z 700}\n", 2, &[]),
             // Positions that it is given.
-            ("MYMOVE(@)\nLIN @\n", 1, &[NotATarget]),
-            ("MYMOVE(1,<N>)\nLIN @\n", 1, &[NotATarget]),
+            ("MYMOVE(@)\nLIN @\n", 0, &[NotATarget, LeftReason::PostureUnknown]),
+            ("MYMOVE(1,<N>)\nLIN @\n", 0, &[NotATarget, LeftReason::PostureUnknown]),
+            ("SETLASER({A 5,B 2},TRUE)\nLIN @\n", 1, &[]),
             ("OK=MYMOVE(@)\n", 0, &[NotATarget]),
             ("MYMOVE(@)\nLIN {Z 700}\n", 0, &[NotATarget, Incomplete]),
             ("P1=@\nMYMOVE(P1)\n", 0, &[NotATarget]),
@@ -128,6 +130,17 @@ fn frames_of_a_spline_block_of_joint_motions_hold_for_it_alone() {
     // What a block takes as its base is no target of its own.
     let body = "P1=@\nLIN P1\nPTP_SPLINE WITH $TOOL=$NULLFRAME, $BASE=P1\nENDSPLINE\n";
     check(&cell, &[(body, 0, &[LeftReason::FramesDiffer])]);
+}
+
+/// Every `BAS` takes them, not the first alone.
+#[test]
+fn motion_data_stay_until_others_are_stated() {
+    let cell = Cell::kuka(187);
+    let body = format!(
+        "TOOL_DATA[1]={NONE}\nBASE_DATA[2]={NONE}\nFDAT_ACT={{TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE}}\nBAS(#PTP_PARAMS,100)\nLIN @\n$BASE={OTHER}\n\
+         BAS(#CP_PARAMS,0.2)\nLIN @\n"
+    );
+    assert_all_meet(&cell, &body, "LIN");
 }
 
 #[test]
@@ -161,11 +174,15 @@ fn targets_to_which_the_tool_keeps_its_orientation_are_left() {
     let data =
         "DECL LDAT L1={VEL 2.0,ORI_TYP #CONSTANT}\nDECL LDAT L2={VEL 2.0,ORI_TYP #VAR}\nDECL LDAT L3={VEL 2.0}\n";
     let kept: &[LeftReason] = &[OrientationKept];
-    let cases: [(&str, usize, &[LeftReason]); 19] = [
+    let initial = format!("TOOL_DATA[1]={NONE}\n$ORI_TYPE=#CONSTANT\nBAS(#INITMOV,0)\nLIN @\n");
+    let cases: [(&str, usize, &[LeftReason]); 21] = [
         ("$ORI_TYPE=#CONSTANT\nLIN @\n", 0, kept),
         ("$ORI_TYPE=#CONSTANT\nSCIRC @,@\nPTP @\nPTP <N>\n", 2, &[OrientationKept, OrientationKept]),
         ("$ORI_TYPE=#CONSTANT\nLIN @\n$ORI_TYPE=#VAR\nLIN @\n", 1, kept),
         ("$ORI_TYPE=#JOINT\nLIN @\n", 1, &[]),
+        // INITMOV of BAS takes #VAR, and so do data of a path without it.
+        (&initial, 1, &[]),
+        ("$ORI_TYPE=#CONSTANT\nLDAT_ACT=L3\nBAS(#CP_PARAMS,0.2)\nLIN @\n", 1, &[]),
         ("$ORI_TYPE=HOW\nLIN @\n", 0, kept),
         ("IF $IN[1] THEN\n$ORI_TYPE=#CONSTANT\nENDIF\nLIN @\n", 0, kept),
         ("SUB( )\nLIN @\nEND\nDEF SUB( )\n$ORI_TYPE=#CONSTANT\n", 0, kept),

@@ -96,6 +96,8 @@ fn positions_that_a_call_in_none_of_the_files_is_given_are_left() {
             0,
             vec![],
         ),
+        ("", "  w=@\n  v=pose_trans(inv(w),make_list(3,w)[0])\n  movel(@)\n".to_owned(), 1, vec![]),
+        ("", "  w=@\n  cap_move(w)\n  cap_move(w)\n".to_owned(), 0, vec![no_target]),
         ("  def far(x):\n    return pose_dist(x,@)\n  end\n", "  d=far(@)\n".to_owned(), 0, vec![]),
         ("", "  camera=rpc_factory(\"xmlrpc\",\"http://a\")\n  camera.look(@)\n".to_owned(), 0, vec![]),
         ("", "  w=@\n  cap_height(w[2])\n".to_owned(), 0, vec![]),

@@ -115,6 +115,8 @@ fn one_of_several_work_objects_is_the_measured_one() {
     assert_eq!(of([0.002, 0.08], None), [None, other], "the second is another one");
     assert_eq!(of([0.06, 0.08], None), [other, other], "either may be the measured one");
     assert_eq!(of([0.06, 0.08], Some(moved(&measured, 0.06))), [None, other], "it is stated which");
+    let stated = Some(measured);
+    assert_eq!(of([0.06, 0.06], stated), [other, other], "it is stated that neither is");
     assert_eq!(of([0.002, 0.00201], None), [None, None], "one frame, written with few digits");
 }
 

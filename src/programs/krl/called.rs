@@ -9,6 +9,7 @@ use super::given::Given;
 use super::moves::{MOVES, RELATIVE, begins_spline};
 use super::reads::{is_still, reads};
 use super::{AXIS_NAMES, Module, POSE_NAMES, Value};
+use crate::programs::program::Left;
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::references::Given as Argument;
 use crate::programs::scan::{Reader, TokenKind};
@@ -23,7 +24,7 @@ const FRAMES: [&str; 2] = ["BASE_DATA[", "TOOL_DATA["];
 
 /// True for numbers that may be a position.
 fn is_position(aggregate: &Aggregate) -> bool {
-    aggregate.has(&POSE_NAMES[..6]) || aggregate.has(&AXIS_NAMES)
+    POSE_NAMES[..3].iter().all(|name| aggregate.has(&[name])) || aggregate.has(&AXIS_NAMES[..1])
 }
 
 /// The tokens of the line from where the reader stands.
@@ -50,7 +51,7 @@ impl Module<'_> {
             let is_called = reader.token_is_mark(at + 1, b'(');
             if is_called && is_beside {
                 self.begins_beside(name);
-            } else if is_called && self.routines.is_seen(&name, reader.index) {
+            } else if is_called && self.flow.has_routine(&name) {
                 self.way.call(name, &mut self.flow, &mut self.now);
             } else if is_called && !is_motion {
                 self.calls_unknown(reader, name, at + 1);
@@ -95,14 +96,21 @@ impl Module<'_> {
             let line = reader.line();
             if Aggregate::read(reader).is_ok_and(|aggregate| is_position(&aggregate)) {
                 let words = format!("{routine} is no motion of the language, and its routine is in none of the files");
-                self.leave_at(reader.index, line, routine, Why::new(LeftReason::NotATarget, words));
+                let why = Why::new(LeftReason::NotATarget, words);
+                let left = Left { file: reader.index, line, name: routine.to_owned(), why };
+                self.way.leave(left, false, &mut self.now.1);
             }
         }
         reader.at = start;
         let may_go_there = |given: &Argument| !reads(routine, &given.which);
         for Argument { name, .. } in given(reader, open).into_iter().filter(may_go_there) {
             let place = match self.values.get(&name) {
-                Some(Value::Aggregate(a) | Value::Copied(Ok((a, _)))) => Some((a.file, a.line)),
+                Some(Value::Aggregate(a) | Value::Copied(Ok((a, _)))) => {
+                    if is_position(a) {
+                        self.way.lose(&mut self.now.1);
+                    }
+                    Some((a.file, a.line))
+                }
                 _ => None,
             };
             self.given.push(Given { name, routine: routine.to_owned(), place });

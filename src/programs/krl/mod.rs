@@ -98,7 +98,6 @@ fn reading(
     known: Places<Now>,
 ) -> Result<(Program, Places<Now>)> {
     let reader = |index: usize, file| Reader::renamed(file, index, DIALECT, |reader| scopes.names(reader));
-    let routines = routines(files)?;
     let mut module = Module {
         setting,
         prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
@@ -108,11 +107,10 @@ fn reading(
         declared: Vec::new(),
         root: FrameIs::Unset,
         now: unset(),
-        flow: Flow::new(known).among(&routines),
+        flow: Flow::new(known).among(&routines(files)?),
         motion_data: None,
         path_data: None,
         spline: None,
-        routines,
         copies: BTreeMap::new(),
         given: Vec::new(),
         way: Itinerary::new(),
@@ -160,14 +158,12 @@ struct Module<'a> {
     now: Now,
     /// How they change.
     flow: Flow<Now>,
-    /// Motion data (`FDAT_ACT`) that `BAS` has not taken yet, as far as the files have them.
+    /// Motion data (`FDAT_ACT`): `None` where nothing stated them, of those that were none where they are in none of the files.
     motion_data: Option<Option<Aggregate>>,
-    /// What the data of a path (`LDAT_ACT`) say of orientations: true where the tool keeps its own, `None` where they say nothing.
+    /// Whether the tool keeps its orientation by the data of a path (`LDAT_ACT`); `None` where nothing stated them.
     path_data: Option<bool>,
     /// Frames of the spline block that is open.
     spline: Option<OwnFrames>,
-    /// Routines in the files.
-    routines: Routines,
     /// Names that the routine has copied before any statement of the text above gave them a value, with their copies.
     copies: BTreeMap<String, Vec<String>>,
     /// Variables that routines in none of the files are given.
@@ -224,9 +220,8 @@ impl Module<'_> {
             return Ok(());
         }
         if name == "$ORI_TYPE" {
-            if let Some(keeps) = self.keeps_orientation(reader) {
-                self.now.0.keeps_orientation.set(keeps);
-            }
+            let keeps = self.keeps_orientation(reader);
+            self.now.0.keeps_orientation.set(keeps);
             return Ok(());
         }
         let value = match component {
@@ -238,7 +233,7 @@ impl Module<'_> {
             "$BASE" => self.now.0.base.set(self.frame(&value)),
             "$ROBROOT" => self.root = self.frame(&value),
             "FDAT_ACT" => self.use_data(&value),
-            "LDAT_ACT" => self.path_data = self.keeps_by_data(&value),
+            "LDAT_ACT" => self.path_data = Some(self.keeps_by_data(&value)),
             _ => {
                 if !no_targets
                     && let Value::Aggregate(a) = &value

@@ -80,6 +80,7 @@ impl Module<'_> {
     fn goes_to(&mut self, value: &Value, motion: &Motion<'_>, auxiliary: Option<&Value>) {
         if let Value::Name(name) = value
             && name.starts_with('$')
+            && !self.values.contains_key(name)
         {
             self.goes_to_variable(name, motion);
             return;
@@ -169,7 +170,7 @@ impl Module<'_> {
         }
         let is_path = matches!(kind, TargetKind::Pose(_)) && !OF_JOINTS.contains(&motion.name);
         if is_path && motion.keeps_orientation {
-            let words = "the tool keeps its orientation, or may keep it, whatever A, B, C say ($ORI_TYPE)";
+            let words = "the tool keeps its orientation, or may keep it, whatever A, B, C say ($ORI_TYPE, or ORI_TYP of its LDAT: give the .dat as well)";
             return Err(Why::new(LeftReason::OrientationKept, words));
         }
         Ok(())

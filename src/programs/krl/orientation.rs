@@ -1,11 +1,12 @@
 //! `$ORI_TYPE`: whether a path of the tool leads to the orientation of its target.
 
+use super::aggregate::Aggregate;
 use super::{Module, Value};
 use crate::programs::scan::Reader;
 
 /// Values with which it does.
 const HEEDED: [&str; 2] = ["VAR", "JOINT"];
-/// Data of the controller whose component has such a value.
+/// Data of the controller that have such a value.
 const DEFAULT: &str = "LDEFAULT";
 
 /// True for a value with which the tool keeps its orientation.
@@ -13,31 +14,33 @@ fn keeps(value: Option<&str>) -> bool {
     value.is_none_or(|value| !HEEDED.contains(&value))
 }
 
+/// True for data of a path with which the tool keeps its orientation; `BAS` takes those without `ORI_TYP` for `#VAR`.
+fn keeps_with(data: &Aggregate) -> bool {
+    data.has(&["ORI_TYP"]) && keeps(data.word("ORI_TYP"))
+}
+
 impl Module<'_> {
-    /// What `#CONSTANT`, `LP1.ORI_TYP` or `SORI_TYP(LP1)` says: true where the tool keeps its orientation, or where that is not known; `None` where
-    /// the data say nothing of it.
-    pub(super) fn keeps_orientation(&self, reader: &Reader<'_>) -> Option<bool> {
+    /// What `#CONSTANT`, `LP1.ORI_TYP` or `SORI_TYP(LP1)` says: true where the tool keeps its orientation, or where that is not known.
+    pub(super) fn keeps_orientation(&self, reader: &Reader<'_>) -> bool {
         let named = |ahead| reader.name_of(reader.at + ahead);
         if reader.is_mark(b'#') {
-            return Some(keeps(named(1).as_deref()));
+            return keeps(named(1).as_deref());
         }
         let data = if reader.ahead_is_mark(1, b'(') { named(2) } else { named(0) };
-        data.map_or(Some(true), |data| self.keeps_by_data(&Value::Name(data)))
+        data.is_none_or(|data| self.keeps_by_data(&Value::Name(data)))
     }
 
     /// The same of the data of a path.
-    pub(super) fn keeps_by_data(&self, value: &Value) -> Option<bool> {
+    pub(super) fn keeps_by_data(&self, value: &Value) -> bool {
         match value {
-            Value::Aggregate(data) => data.has(&["ORI_TYP"]).then(|| keeps(data.word("ORI_TYP"))),
+            Value::Aggregate(data) | Value::Copied(Ok((data, _))) => keeps_with(data),
+            Value::Name(name) if self.assigned.changes(name) => true,
             Value::Name(name) => match self.values.get(name) {
-                _ if self.assigned.changes(name) => Some(true),
-                Some(Value::Aggregate(data)) => self.keeps_by_data(&Value::Aggregate(data.clone())),
-                Some(Value::Copied(Ok((data, _)))) => self.keeps_by_data(&Value::Aggregate(data.clone())),
-                None if name == DEFAULT => None,
-                _ => Some(true),
+                Some(Value::Aggregate(data) | Value::Copied(Ok((data, _)))) => keeps_with(data),
+                None => name != DEFAULT,
+                Some(_) => true,
             },
-            Value::Copied(Ok((data, _))) => self.keeps_by_data(&Value::Aggregate(data.clone())),
-            Value::Copied(Err(_)) | Value::Expression => Some(true),
+            Value::Copied(Err(_)) | Value::Expression => true,
         }
     }
 }

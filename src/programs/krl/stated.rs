@@ -77,7 +77,7 @@ impl Module<'_> {
 
     /// `BAS(#FRAMES)` and what does the same takes the motion data.
     fn take_data(&mut self) {
-        if let Some(data) = self.motion_data.take() {
+        if let Some(data) = self.motion_data.clone() {
             let frames = self.frames_of(data.as_ref());
             self.now.0.set(frames);
         }
@@ -114,7 +114,7 @@ impl Module<'_> {
                 }
                 Some("$ORI_TYPE") => {
                     reader.at += 1;
-                    frames.keeps_orientation = self.keeps_orientation(reader);
+                    frames.keeps_orientation = Some(self.keeps_orientation(reader));
                 }
                 _ => {}
             }
@@ -185,6 +185,7 @@ impl Module<'_> {
             Some("INITMOV") => {
                 let (tool, base) = (self.numbered("TOOL_DATA", 1), FrameIs::Known(Pose::identity()));
                 self.now.0.set(Frames { tool, base, tool_in_room: false });
+                self.now.0.keeps_orientation.set(false);
             }
             _ => {}
         }

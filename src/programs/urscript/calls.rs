@@ -16,7 +16,7 @@ const ELSEWHERE: [(&str, bool); 5] =
 const WORDS: [&str; 13] =
     ["and", "case", "elif", "for", "if", "in", "not", "or", "return", "run", "switch", "while", "xor"];
 /// Functions of the language that can be given a position and do not go there (Universal Robots, *The URScript Programming Language*).
-const READ: [&str; 47] = [
+const READ: [&str; 50] = [
     "add_frame",
     "assert",
     "attach_frame",
@@ -28,8 +28,10 @@ const READ: [&str; 47] = [
     "get_jacobian_time_derivative",
     "get_list_length",
     "interpolate_pose",
+    "inv",
     "is_within_safety_limits",
     "length",
+    "make_list",
     "move_frame",
     "norm",
     "path_offset_set",
@@ -57,6 +59,7 @@ const READ: [&str; 47] = [
     "socket_send_string",
     "socket_set_var",
     "str_cat",
+    "struct",
     "textmsg",
     "to_str",
     "track_conveyor_circular",
@@ -179,7 +182,7 @@ impl Script<'_> {
     /// The robot goes there, or does not.
     fn goes_perhaps(&mut self, name: &str, given: Given) {
         let words = format!(
-            "{name} is in none of the files, or hands it on to such a one: what that does with it is not known"
+            "{name} is in none of the files, or calls a routine that is not: what it does with this position is not known"
         );
         let why = Why::new(LeftReason::NotATarget, words);
         let left = Left { file: self.reader.index, line: self.reader.line(), name: name.to_owned(), why };
@@ -192,11 +195,13 @@ impl Script<'_> {
         }
     }
 
-    /// Positions in variables to which only such calls may go.
+    /// Positions in variables to which only such calls may go, each named once.
     pub(super) fn leave_unvisited(&mut self) {
+        let mut named = BTreeSet::new();
         for (first_byte, left) in std::mem::take(&mut self.perhaps) {
             let targets = &self.way.program.targets;
-            if !targets.iter().any(|t| t.file == left.file && t.kind.first_byte() == first_byte) {
+            let is_target = targets.iter().any(|t| t.file == left.file && t.kind.first_byte() == first_byte);
+            if !is_target && named.insert((left.file, first_byte)) {
                 self.way.program.left.push(left);
             }
         }
