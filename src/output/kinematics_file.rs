@@ -30,8 +30,8 @@ const SAME_M: f64 = 1e-6;
 /// Loss (m) from which a file cannot stand for the corrected URDF.
 const LOSS_M: f64 = 1e-6;
 
-/// The flange of every robot of Universal Robots stands further than this (m) from the axis of its second wrist joint.
-const FLANGE_OFF_WRIST_2_M: f64 = 0.05;
+/// The flange of a robot of Universal Robots stands so far (m) from the axis of its second wrist joint: 82 mm of a UR5 to 154 mm of a UR20.
+const FLANGE_OFF_WRIST_2_M: std::ops::Range<f64> = 0.05..0.17;
 
 /// Robot descriptions (packages of ROS) that read a file of kinematics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,12 +122,12 @@ impl Flange {
         let tip = description.rigid_pose(wrist, &chain.tip);
         let own = format!("{prefix}tool0");
         let named = [own.as_str(), "tool0"].into_iter().find_map(|link| description.rigid_pose(wrist, link));
-        let mut others = description.links().filter(|link| link.ends_with("tool0"));
-        let named = named.or_else(|| others.find_map(|link| description.rigid_pose(wrist, link)));
         let origin = chain.joints.iter().find(|j| j.name == wrist_3)?.origin;
-        let is_off = |behind: &Pose| (origin * *behind).translation.xy().norm() > FLANGE_OFF_WRIST_2_M;
-        let unnamed = || [Some(Pose::identity()), tip].into_iter().flatten().find(is_off);
-        let behind = named.or_else(unnamed).filter(turns_about_z)?;
+        let is_flange = |behind: &Pose| FLANGE_OFF_WRIST_2_M.contains(&(origin * *behind).translation.xy().norm());
+        let alike = description.links().filter(|link| link.ends_with("tool0"));
+        let alike = alike.filter_map(|link| description.rigid_pose(wrist, link));
+        let mut unnamed = alike.chain([Pose::identity()]).chain(tip);
+        let behind = named.or_else(|| unnamed.find(is_flange)).filter(turns_about_z)?;
         let (angle, distance) = behind.distance(&Pose::identity());
         let behind = if angle < SAME_RAD && distance < SAME_M { Pose::identity() } else { behind };
         Some(Self { behind, tip: tip.map(|tip| behind.inverse() * tip) })
