@@ -51,7 +51,7 @@ pub const CHECKS: &[Check] = &[
         explains: |own, other| match (own, other) {
             (Finding::Displaced(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::Displaced(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
-            (Finding::FocusChange(_), Finding::LooseMounting(_)) => true,
+            (Finding::FocusChange(own), Finding::LooseMounting(_)) => own.weight == Weight::Gate,
             (Finding::FocusChange(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             (Finding::ZeroMoved(own), Finding::LooseMounting(_)) => own.explains_two_places(),
             (Finding::ZeroMoved(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),

@@ -252,7 +252,7 @@ impl Kind for Mistake {
                 format!("write camera_mount = \"{word}\" in series.toml")
             }
             MistakeKind::Mirrored => {
-                "mirror the images back, or have camera and converter write them as the sensor sees (no mirroring, no exchange of rows and columns); if they are right, joints that turn the arm to its sides all count the other way, as A1, A4 and A6 of an arm with six joints".into()
+                "mirror the images back, or have camera and converter write them as the sensor sees (no mirroring, no exchange of rows and columns); if they are right, negate the joints that turn the arm to its sides, as A1, A4 and A6 of an arm with six joints".into()
             }
             MistakeKind::Lengths { constant: Some(joint), .. } => format!(
                 "look whether {joint} moved between the stops: write its readings into joints.csv; if it stood still, check that the URDF is of this robot and size, with lengths in metres"
@@ -329,7 +329,7 @@ impl Mistake {
                 "the camera stands still and the plate is in the hand: read so, the images fit".into()
             }
             MistakeKind::Mirrored => {
-                "the images are mirrored, or their rows and columns are exchanged: mirrored back they fit the joint readings".into()
+                "the images are mirrored (or their rows and columns are exchanged), or all joints that turn the arm to its sides count the other way: with either undone the images fit, and they do not tell which".into()
             }
             MistakeKind::Lengths { angle_rad, distance_m, constant } => {
                 let fit = format!(

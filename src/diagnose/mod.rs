@@ -78,7 +78,7 @@ pub use scatter::LargeScatter;
 pub use stands_still::{StandsStill, all_stand_still, stands_still};
 pub use stated_noise::NoiseContradicted;
 pub use tag_size::{TagsOff, tags_off};
-pub use tool_in_poses::ToolInPoses;
+pub use tool_in_poses::{PosesOf, ToolInPoses};
 pub use undetermined::FlangeUndetermined;
 pub use zero_moved::ZeroMoved;
 pub use zeros_off::ZeroOff;

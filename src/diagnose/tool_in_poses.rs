@@ -1,4 +1,4 @@
-//! Are the poses of a controller those of a tool?
+//! Are the poses of a controller those of a tool, or in another frame than the base?
 
 use super::kind::{Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
@@ -6,13 +6,24 @@ use crate::error::Code;
 /// Series that are named.
 const NAMED: usize = 6;
 
-/// A tool with which the images fit decidedly better than where the poses are taken for those of the flange.
+/// What poses of a controller are, if they are not those of the flange in the base.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PosesOf {
+    /// Of a tool on the flange.
+    Tool,
+    /// In a frame in the base.
+    Frame,
+}
+
+/// A tool or a frame with which the images fit decidedly better than where the poses are taken for those of the flange in the base.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToolInPoses {
     /// Series with such poses.
     pub series: Vec<String>,
-    /// Position of the tool on the flange, m.
-    pub tool_m: [f64; 3],
+    /// Which.
+    pub of: PosesOf,
+    /// Position of the tool on the flange, or of the frame in the base, m.
+    pub place_m: [f64; 3],
     /// Its sigma, m.
     pub sigma_m: [f64; 3],
     /// Gain of the log likelihood.
@@ -21,7 +32,10 @@ pub struct ToolInPoses {
 
 impl Kind for ToolInPoses {
     fn code(&self) -> Code {
-        Code::PosesOfTool
+        match self.of {
+            PosesOf::Tool => Code::PosesOfTool,
+            PosesOf::Frame => Code::PosesInFrame,
+        }
     }
 
     fn weight(&self) -> Weight {
@@ -33,8 +47,11 @@ impl Kind for ToolInPoses {
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        let names = ["tool_x", "tool_y", "tool_z"];
-        let place = names.iter().zip(self.tool_m).zip(self.sigma_m);
+        let names = match self.of {
+            PosesOf::Tool => ["tool_x", "tool_y", "tool_z"],
+            PosesOf::Frame => ["frame_x", "frame_y", "frame_z"],
+        };
+        let place = names.iter().zip(self.place_m).zip(self.sigma_m);
         let place = place.map(|((name, m), sigma)| Quantity { sigma: Some(sigma), ..Quantity::new(name, m, "m") });
         place.chain([Quantity::new("log_likelihood_gain", self.gain, "1")]).collect()
     }
@@ -44,14 +61,20 @@ impl Kind for ToolInPoses {
     }
 
     fn seen(&self) -> String {
-        let [x, y, z] = self.tool_m.map(|m| 1e3 * m);
+        let [x, y, z] = self.place_m.map(|m| 1e3 * m);
         let largest = 1e3 * self.sigma_m.iter().fold(0.0f64, |l, s| l.max(*s));
-        format!(
-            "the poses are not those of the flange: the images fit far better if they are those of a tool at about x {x:.0}, y {y:.0}, z {z:.0} mm (+- {largest:.0}) on it"
-        )
+        let place = format!("at about x {x:.0}, y {y:.0}, z {z:.0} mm (+- {largest:.0})");
+        match self.of {
+            PosesOf::Tool => format!(
+                "the poses are not those of the flange: the images fit far better if they are those of a tool {place} on it"
+            ),
+            PosesOf::Frame => format!(
+                "the poses are not in the base of the robot: the images fit far better if they are in a frame {place} in it"
+            ),
+        }
     }
 
     fn remedy(&self) -> String {
-        "write poses of the flange (the tool set to zero where they are shown or logged), or record joint readings (joints.csv)".into()
+        "write poses of the flange in the base of the robot (tool and user frame set to zero where they are shown or logged), or record joint readings (joints.csv)".into()
     }
 }

@@ -75,7 +75,7 @@ pub(super) fn other_postures(series: &Series, chain: &Chain, stops: &[MeasuredSt
 pub(super) fn notice(series: &Series, chain: &Chain) -> Option<Notice> {
     let what = "has poses: the joint readings are those with which the robot of the URDF reaches them, in the posture that the images \
                 tell, else in that nearest to the stop before, and at the first stop nearest to the middle of the limits";
-    let remedy = "see that they are those of the flange (no tool set), and that the URDF is the model in the controller (of a corrected one the readings are wrong by the correction), or record \
+    let remedy = "see that they are those of the flange in the base (no tool, no user frame), and that the URDF is the model in the controller (of a corrected one the readings are wrong by the correction), or record \
                   joint readings (joints.csv): they know the posture, and no model plays a part then";
     postures_are_computed(series, chain)
         .then(|| Notice::new(Code::PosturesFromPoses, series.readings_file().display(), what, remedy))

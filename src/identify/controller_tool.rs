@@ -1,8 +1,8 @@
-//! Whether the poses of a controller are those of a tool, which was taken for the flange.
+//! Whether the poses of a controller are those of a tool, which was taken for the flange, or stand in another frame than the base.
 //!
-//! With a tool `T` on the flange the controller states `P = N(q) T`, and the readings are `q(T) = N^-1(P T^-1)`. A robot that is as in its
-//! model would absorb the tool in the hand-eye transform, whatever it is; of the real one the errors at `q(T)` are others. So the tool has the
-//! least
+//! With a tool `T` on the flange, or a frame `T` in the base, the controller states `P = N(q) T` or `T^-1 N(q)`, and the readings are
+//! `q(T) = N^-1(P T^-1)` or `N^-1(T P)`. A robot that is as in its model would absorb `T` in the hand-eye transform or the target pose, whatever it
+//! is; of the real one the errors at `q(T)` are others. So it has the least
 //!
 //! ```text
 //! c(T) = min_x sum_i |e_i - G_i(q(T)) x|^2 + x' P^-1 x
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::computed_postures::{Compared, Knowledge};
 use crate::assess::Limits;
-use crate::diagnose::ToolInPoses;
+use crate::diagnose::{PosesOf, ToolInPoses};
 use crate::error::Result;
 use crate::geom::{Pose, exp_so3};
 use crate::model::inverse::{reading_limits, solve_from};
@@ -37,7 +37,7 @@ const MOST_DAMPING: f64 = 1e3;
 /// A step that gains less of the cost ends the search.
 const GAINED: f64 = 1e-4;
 
-/// The tool with which the images fit decidedly better, where the readings of the series were computed from poses.
+/// The tool or the frame with which the images fit decidedly better, where the readings of the series were computed from poses.
 pub(super) fn tool_in_poses(
     robot: &Robot,
     series: &[MeasuredSeries],
@@ -49,21 +49,18 @@ pub(super) fn tool_in_poses(
     }
     let _stage = stage("tool in poses");
     let compared = Compared::of(robot, series, limits, hold)?;
-    let search = Search::new(&compared, robot)?;
-    let none = search.at(Vector6::zeros())?;
-    let starts = STARTS_M.map(|z| Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0));
-    let found: Vec<Tried> = starts.into_par_iter().filter_map(|start| search.least(search.at(start)?)).collect();
-    let best = found.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-    let gain = 0.5 * search.equations as f64 * (none.cost / best.cost).ln();
-    let sigma_m = search.sigma_m(&best)?;
-    let tool_m = best.tool.fixed_rows::<3>(0).into_owned();
-    let is_told = gain > limits.tool_log_odds && tool_m.norm() > limits.tool_sigmas * sigma_m.norm();
+    let searches = [PosesOf::Tool, PosesOf::Frame].map(|of| Search::new(&compared, series, robot, of));
+    let found: Vec<(PosesOf, Tried, Vector3<f64>, f64)> =
+        searches.into_iter().flatten().filter_map(|search| search.told(limits)).collect();
+    let (of, best, sigma_m, gain) = found.into_iter().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))?;
+    let place_m = best.tool.fixed_rows::<3>(0).into_owned();
     let names = series.iter().filter(|s| s.readings_are_computed()).map(|s| s.name.clone()).collect();
-    is_told.then(|| ToolInPoses { series: names, tool_m: tool_m.into(), sigma_m: sigma_m.into(), gain })
+    Some(ToolInPoses { series: names, of, place_m: place_m.into(), sigma_m: sigma_m.into(), gain })
 }
 
 struct Search<'a> {
     compared: &'a Compared,
+    of: PosesOf,
     nominal: Robot,
     limits: Vec<(f64, f64)>,
     /// Images of the stops that are compared, the readings that were taken, and the pose that was stated.
@@ -71,7 +68,7 @@ struct Search<'a> {
     equations: usize,
 }
 
-/// A tool, and what the stops say with it.
+/// A tool or a frame, and what the stops say with it.
 struct Tried {
     /// m, and rad as a rotation vector.
     tool: Vector6<f64>,
@@ -87,11 +84,15 @@ fn pose(tool: &Vector6<f64>) -> Pose {
 }
 
 impl<'a> Search<'a> {
-    fn new(compared: &'a Compared, robot: &Robot) -> Option<Self> {
+    fn new(compared: &'a Compared, series: &[MeasuredSeries], robot: &Robot, of: PosesOf) -> Option<Self> {
         let nominal = Robot::nominal(robot.chain.clone());
         let problem = &compared.adjustment.problem;
         let taken = |images: &'a Vec<usize>| {
-            let posture = problem.stops[problem.images[*images.first()?].stop].posture.as_ref()?;
+            let first = &problem.images[*images.first()?];
+            if !series[first.series].readings_are_computed() {
+                return None;
+            }
+            let posture = problem.stops[first.stop].posture.as_ref()?;
             let stated = nominal.base_from_tip(&posture.readings);
             Some((images.as_slice(), posture.readings.clone(), stated))
         };
@@ -99,35 +100,51 @@ impl<'a> Search<'a> {
         let stops: Vec<_> = spread(all.len(), MOST_STOPS).map(|k| all[k].clone()).collect();
         let equations = stops.iter().map(|(images, ..)| 6 * images.len()).sum();
         let limits = reading_limits(&robot.chain);
-        (!stops.is_empty()).then_some(Self { compared, nominal, limits, stops, equations })
+        (!stops.is_empty()).then_some(Self { compared, of, nominal, limits, stops, equations })
     }
 
-    /// What carries the cameras or plates of the flange with a tool: `flange_from_camera` is `T tool_from_camera`.
-    fn state(&self, tool: &Pose) -> State {
+    /// What the flange carries stands as it was on the tool, what is fixed as it was in the frame.
+    fn state(&self, of: &Pose) -> State {
         let Adjustment { problem, state } = &self.compared.adjustment;
-        let mut state = state.clone();
-        let (mut mountings, mut placements) = (state.mountings.clone(), state.placements.clone());
+        let mut moved = state.clone();
         for image in self.stops.iter().flat_map(|(images, ..)| *images).map(|i| &problem.images[*i]) {
-            match image.mount {
-                CameraMount::Hand => mountings[image.mounting] = *tool * state.mountings[image.mounting],
-                CameraMount::Fixed => placements[image.placement] = *tool * state.placements[image.placement],
+            let moves_camera = (image.mount == CameraMount::Hand) == (self.of == PosesOf::Tool);
+            match moves_camera {
+                true => moved.mountings[image.mounting] = *of * state.mountings[image.mounting],
+                false => moved.placements[image.placement] = *of * state.placements[image.placement],
             }
         }
-        (state.mountings, state.placements) = (mountings, placements);
-        state
+        moved
     }
 
-    /// `None` where a stop is out of reach with this tool.
+    /// `None` where a stop is out of reach with this tool or frame.
     fn stops_with(&self, tool: &Vector6<f64>) -> Option<Vec<(DMatrix<f64>, DVector<f64>)>> {
-        let tool = pose(tool);
-        let state = self.state(&tool);
+        let of = pose(tool);
+        let state = self.state(&of);
         let origins = state.robot.linear_origins();
-        let without = tool.inverse();
+        let without = of.inverse();
         let one = |(images, taken, stated): &(&[usize], Vec<f64>, Pose)| {
-            let readings = solve_from(&self.nominal, &self.limits, &(*stated * without), taken)?;
+            let flange = match self.of {
+                PosesOf::Tool => *stated * without,
+                PosesOf::Frame => of * *stated,
+            };
+            let readings = solve_from(&self.nominal, &self.limits, &flange, taken)?;
             self.compared.seen_at((&state, &origins), images, &readings)
         };
         self.stops.par_iter().map(one).collect()
+    }
+
+    /// The best one, with the sigma of its place (m) and the gain of the log likelihood, if it is told.
+    fn told(&self, limits: &Limits) -> Option<(PosesOf, Tried, Vector3<f64>, f64)> {
+        let none = self.at(Vector6::zeros())?;
+        let starts = STARTS_M.map(|z| Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0));
+        let found: Vec<Tried> = starts.into_par_iter().filter_map(|start| self.least(self.at(start)?)).collect();
+        let best = found.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+        let gain = 0.5 * self.equations as f64 * (none.cost / best.cost).ln();
+        let sigma_m = self.sigma_m(&best)?;
+        let far_m = best.tool.fixed_rows::<3>(0).norm();
+        let is_told = gain > limits.tool_log_odds && far_m > limits.tool_sigmas * sigma_m.norm();
+        is_told.then_some((self.of, best, sigma_m, gain))
     }
 
     fn at(&self, tool: Vector6<f64>) -> Option<Tried> {

@@ -10,6 +10,7 @@ use robotcal::calibration::{Calibration, Ends, Export, Inputs};
 use robotcal::diagnose::Finding;
 use robotcal::geom::{Pose, log_so3};
 use robotcal::identify::{Options, RobotModel, identify, verify_series};
+use robotcal::model::inverse::{reading_limits, solve_from};
 use robotcal::model::robot::Robot;
 use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::simulate::truth::Truth;
@@ -296,27 +297,52 @@ fn mistakes_in_the_poses_are_not_blamed_on_right_angles_of_the_first_stop() {
     }
 }
 
-/// What a controller shows with a tool set. A robot that is as in its model would hide any of them in the hand-eye transform.
+/// What a controller shows with a tool or a user frame set. A robot that is as in its model would hide any of them in the hand-eye transform or
+/// the target pose.
 #[test]
-fn poses_of_a_tool_are_told_from_those_of_the_flange() {
-    let (_, readings, poses) = by_joints();
-    let deg: Vec<f64> = readings[0].iter().map(|q| q.to_degrees()).collect();
-    for z in [0.0, 0.06] {
-        let tool = Pose::exp(&Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0));
-        let shown: Vec<(String, Pose)> = poses.iter().map(|(image, pose)| (image.clone(), *pose * tool)).collect();
-        let folder = series("quaternion", "qx,qy,qz,qw", &shown, quaternion);
-        let path = folder.path().join("series.toml");
-        fs::write(&path, fs::read_to_string(&path).unwrap() + &format!("first_stop_deg = {deg:?}\n")).unwrap();
-        let inputs = Inputs::read(&urdf(), &[folder.path().to_path_buf()], Ends::default()).unwrap();
+fn poses_of_a_tool_or_in_a_frame_are_told_from_those_of_the_flange_in_the_base() {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let chain = robotcal::urdf::read(&urdf).unwrap().chain(Some("base_link"), Some("link_6")).unwrap();
+    let plate = design(&PlateRequest { markers: Some(60), ..PlateRequest::default() }).unwrap().plate;
+    let made = simulated(&WorldRequest { images: 40, seed: 5, ..WorldRequest::typical(chain.clone(), plate) }).unwrap();
+    let robot = Robot::nominal(chain.clone());
+    let limits = reading_limits(&chain);
+    // The axis of the flange is x of link_6.
+    let cases =
+        [(None, [0.0; 3]), (Some(Code::PosesOfTool), [0.1, 0.0, 0.0]), (Some(Code::PosesInFrame), [0.0, 0.0, 0.04])];
+    for (code, place) in cases {
+        let by = Pose::from_xyz_rpy(place, [0.0; 3]);
+        let mut seen = measured(&made, &chain);
+        seen.stops.retain_mut(|stop| {
+            let flange = robot.base_from_tip(stop.readings.as_ref().unwrap());
+            let shown = match code {
+                None => flange,
+                Some(Code::PosesOfTool) => flange * by,
+                _ => by.inverse() * flange,
+            };
+            stop.readings = solve_from(&robot, &limits, &shown, stop.readings.as_ref().unwrap());
+            stop.readings.is_some()
+        });
+        let computed: Vec<Vec<f64>> = seen.stops.iter().map(|stop| stop.readings.clone().unwrap()).collect();
+        assert!(computed.len() > 30);
+        // Of all stops but one the angles are stated.
+        seen.postures = vec![Vec::new(); computed.len()];
+        seen.postures[1].push(turned_over(&computed[1]));
         let options = Options { model: RobotModel::Rigid, ..Options::default() };
-        let calibration = Calibration::of(inputs.observe(&|_, _| ()).unwrap(), &options).unwrap();
-        let told = calibration.findings().iter().find(|f| f.code() == Code::PosesOfTool);
-        assert_eq!(told.is_some(), z > 0.0, "{told:?}");
-        for (quantity, true_m) in told.iter().flat_map(|f| f.quantities()).take(3).zip([0.0, 0.0, z]) {
+        let solution = identify(chain.clone(), &[seen], &options).unwrap();
+        let told = solution.findings.iter().find(|f| matches!(f, Finding::ToolInPoses(_)));
+        println!("{told:?}");
+        assert_eq!(told.map(Finding::code), code);
+        for (quantity, true_m) in told.iter().flat_map(|f| f.quantities()).take(3).zip(place) {
             let sigma = quantity.sigma.unwrap();
             assert!(sigma < 0.02 && (quantity.value - true_m).abs() < 4.0 * sigma, "{quantity:?}");
         }
     }
+}
+
+/// The same pose with the wrist turned over.
+fn turned_over(q: &[f64]) -> Vec<f64> {
+    [q[0], q[1], q[2], q[3] - PI * q[3].signum(), -q[4], q[5] - PI * q[5].signum()].to_vec()
 }
 
 #[test]
@@ -370,8 +396,6 @@ fn a_wrist_turned_over_at_all_stops_is_told_to_be_open() {
     let made = simulated(&WorldRequest { images: 24, seed: 4, ..WorldRequest::typical(chain.clone(), plate) }).unwrap();
     let mut seen = measured(&made, &chain);
     let truth: Vec<Vec<f64>> = seen.stops.iter().map(|s| s.readings.clone().unwrap()).collect();
-    let turned_over =
-        |q: &[f64]| [q[0], q[1], q[2], q[3] - PI * q[3].signum(), -q[4], q[5] - PI * q[5].signum()].to_vec();
     let robot = Robot::nominal(chain.clone());
     for (k, (stop, q)) in seen.stops.iter_mut().zip(&truth).enumerate() {
         let other = turned_over(q);
