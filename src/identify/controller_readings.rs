@@ -12,7 +12,7 @@ use crate::geom::Pose;
 use crate::model::inverse::{random_readings, reading_limits, solve_from};
 use crate::model::robot::Robot;
 use crate::problem::MeasuredStop;
-use crate::series::{ControllerPoses, ReadOtherwise, Series};
+use crate::series::{ControllerPoses, LENGTH_UNITS, LengthUnit, ReadOtherwise, Series};
 use crate::urdf::{Chain, JointKind};
 
 /// Coordinates of a pose.
@@ -25,8 +25,6 @@ const MOST_POSTURES: usize = 15;
 const SAME: f64 = 1e-3;
 /// Angles that are stated for a posture are nearer than this, rad: another posture is farther.
 const FARTHEST_STATED_RAD: f64 = 0.5;
-/// Units that positions are in when they are not in metres, and metres of each.
-const LENGTH_UNITS: [(&str, f64); 3] = [("inches", 0.0254), ("millimetres", 1e-3), ("centimetres", 1e-2)];
 /// Poses that tell whether the poses of a series can be reached.
 const TRIED: usize = 8;
 
@@ -81,27 +79,32 @@ pub(super) fn notice(series: &Series, chain: &Chain) -> Option<Notice> {
         .then(|| Notice::new(Code::PosturesFromPoses, series.readings_file().display(), what, remedy))
 }
 
-/// A pose read as with this mistake undone, from this unit of length.
-type ReadAs<'a> = (Option<&'a ReadOtherwise>, Option<&'a (&'static str, f64)>, Pose);
+/// A way to read a pose other than as it is written.
+enum ReadAs<'a> {
+    Rotation(&'a ReadOtherwise),
+    Unit(&'a LengthUnit),
+    Both(&'a ReadOtherwise, &'a LengthUnit),
+}
 
 const fn is_angle(kind: JointKind) -> bool {
     !matches!(kind, JointKind::Prismatic)
 }
 
-/// Poses that the stated angles reach when they are read otherwise, or in another unit.
-fn misread(other: Option<&ReadOtherwise>, unit: Option<&(&str, f64)>, place: String) -> Error {
+/// Poses that the stated angles reach when they are read in another way.
+fn misread(way: &ReadAs, place: String) -> Error {
     let fit = "the robot reaches them with the angles of first_stop_deg";
-    let rotations = other.map(|o| (o.code, o.what.replace("the images fit", fit), o.remedy.clone()));
-    let Some((name, metres)) = unit else {
-        let (code, what, remedy) = rotations.unwrap_or_else(|| (Code::SettingConflict, String::new(), String::new()));
-        return Error::new(code, place, what, remedy);
-    };
-    let (what, remedy) = (format!("positions are in {name}"), format!("multiply x_m, y_m and z_m by {metres}"));
-    match rotations {
-        Some((_, also, do_also)) => {
-            Error::new(Code::MeasuredUnit, place, format!("{what}, and {also}"), format!("{remedy}; {do_also}"))
+    let in_unit = |unit: &LengthUnit| format!("positions are in {}", unit.name);
+    let to_metres = |unit: &LengthUnit| format!("multiply x_m, y_m and z_m by {}", unit.metres);
+    match way {
+        ReadAs::Rotation(other) => Error::new(other.code, place, other.says(fit), &other.remedy),
+        ReadAs::Unit(unit) => {
+            let what = format!("{}: in metres {fit}", in_unit(unit));
+            Error::new(Code::MeasuredUnit, place, what, to_metres(unit))
         }
-        None => Error::new(Code::MeasuredUnit, place, format!("{what}: in metres {fit}"), remedy),
+        ReadAs::Both(other, unit) => {
+            let what = format!("{}, and {}", in_unit(unit), other.says(fit));
+            Error::new(Code::MeasuredUnit, place, what, format!("{}; {}", to_metres(unit), other.remedy))
+        }
     }
 }
 
@@ -194,18 +197,15 @@ impl Arm {
         let written = poses.base_from_flange[row];
         let others: Vec<(&ReadOtherwise, Pose)> =
             poses.otherwise.iter().filter_map(|other| Some((other, other.poses[row]?))).collect();
-        let turned = others.iter().map(|(other, pose)| (Some(*other), None, *pose));
-        let scaled = |other, pose: Pose| {
-            LENGTH_UNITS
-                .iter()
-                .map(move |unit| (other, Some(unit), Pose::new(pose.rotation, pose.translation * unit.1)))
-        };
-        let one: Vec<ReadAs> = written.iter().flat_map(|pose| scaled(None, *pose)).chain(turned).collect();
-        let two: Vec<ReadAs> = others.iter().flat_map(|(other, pose)| scaled(Some(*other), *pose)).collect();
-        for ways in [one, two] {
-            if let Some(k) = self.nearest_to(stated, ways.iter().map(|(.., pose)| *pose)) {
-                let (other, unit, _) = ways[k];
-                return misread(other, unit, of_poses);
+        let scaled = |pose: &Pose, unit: &LengthUnit| Pose::new(pose.rotation, pose.translation * unit.metres);
+        let rotations = others.iter().map(|(other, pose)| (ReadAs::Rotation(other), *pose));
+        let units = LENGTH_UNITS.iter().filter_map(|unit| Some((ReadAs::Unit(unit), scaled(&written?, unit))));
+        let both = LENGTH_UNITS
+            .iter()
+            .flat_map(|unit| others.iter().map(move |(other, pose)| (ReadAs::Both(other, unit), scaled(pose, unit))));
+        for ways in [units.chain(rotations).collect::<Vec<_>>(), both.collect()] {
+            if let Some(k) = self.nearest_to(stated, ways.iter().map(|(_, pose)| *pose)) {
+                return misread(&ways[k].0, of_poses);
             }
         }
         let tip = self.robot.base_from_tip(stated);
@@ -289,7 +289,7 @@ impl Arm {
         if !self.reaches(&poses.base_from_flange)
             && let Some(other) = poses.otherwise.iter().find(|o| self.reaches(&o.poses))
         {
-            let what = other.what.replace("the images fit", "the robot reaches them");
+            let what = other.says("the robot reaches them");
             return Error::new(other.code, place, what, &other.remedy);
         }
         let what = format!("the robot of the URDF reaches no such pose of \"{}\" in \"{}\"", chain.tip, chain.base);

@@ -2,13 +2,11 @@
 
 use crate::diagnose::MistakeKind;
 use crate::model::robot::Robot;
+use crate::series::{LENGTH_UNITS, LengthUnit};
 use crate::urdf::JointKind;
 
 /// The readings of all stops with one mistake undone, and its name.
 pub(super) type Undone = (Vec<Vec<f64>>, MistakeKind);
-
-/// Units that lengths are recorded in, and metres of each.
-const LENGTHS: [(&str, f64); 3] = [("millimetres", 1e-3), ("centimetres", 1e-2), ("inches", 0.0254)];
 
 /// Every one of a single joint, of two or three, of all, and of rows.
 pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> {
@@ -40,8 +38,8 @@ pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> 
             }
         }
         if kinds[k] == JointKind::Prismatic {
-            for (unit, metres) in LENGTHS {
-                add(MistakeKind::SlideUnit { joint: names[k].clone(), unit, metres }, &|q| q[k] *= metres);
+            for LengthUnit { name, metres, .. } in LENGTH_UNITS {
+                add(MistakeKind::SlideUnit { joint: names[k].clone(), unit: name, metres }, &|q| q[k] *= metres);
             }
         }
         if kinds[k] == JointKind::Revolute {

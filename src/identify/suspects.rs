@@ -12,7 +12,7 @@ use crate::geom::Pose;
 use crate::init::{PosePair, SeenStop, plate_scale, solve_hand_eye, upper_median};
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
-use crate::series::{CameraMount, spread};
+use crate::series::{CameraMount, LENGTH_UNITS, spread};
 use crate::urdf::JointKind;
 
 /// Images of one camera mounting and one plate placement with what they say.
@@ -26,9 +26,6 @@ pub(super) struct Suspects<'a> {
 
 /// Images by which a mistake is seen to explain the misfit of all.
 pub(super) const ENOUGH: usize = 100;
-
-/// Of lengths in one another: millimetres, centimetres, metres, inches.
-const UNITS: [f64; 6] = [10.0, 100.0, 1000.0, 2.54, 25.4, 1000.0 / 25.4];
 
 impl Suspects<'_> {
     /// The mistake that, undone, fits far better than `misfit`, if there is one, and the misfit that it then leaves.
@@ -83,7 +80,7 @@ impl Suspects<'_> {
         });
         let (error, k) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let other = &self.series.first()?.otherwise[k];
-        let (code, what, remedy) = (other.code, other.what.clone(), other.remedy.clone());
+        let (code, what, remedy) = (other.code, other.says("the images fit"), other.remedy.clone());
         Some((error, MistakeKind::Poses { code, what, remedy }))
     }
 
@@ -171,8 +168,9 @@ impl Suspects<'_> {
     /// A plate is mistaken for one of another size, or its size is in another unit.
     fn is_scale_of_plates(&self, scale: f64) -> bool {
         let larger = scale.max(1.0 / scale);
-        let is_unit = |unit: &f64| (larger / unit - 1.0).abs() < self.limits.scale_of_unit;
-        larger < self.limits.scale_most || UNITS.iter().any(is_unit)
+        let units_m = || LENGTH_UNITS.iter().map(|unit| unit.metres).chain([1.0]);
+        let is_unit = |ratio: f64| ratio > 1.0 && (larger / ratio - 1.0).abs() < self.limits.scale_of_unit;
+        larger < self.limits.scale_most || units_m().any(|a| units_m().any(|b| is_unit(a / b)))
     }
 
     fn wrong_scale(&self) -> Option<(f64, MistakeKind)> {

@@ -19,7 +19,7 @@ pub struct ControllerPoses {
 pub struct ReadOtherwise {
     /// Which mistake.
     pub code: Code,
-    /// How the table would be to be read.
+    /// How the table would be to be read; what fits then is to be added.
     pub what: String,
     /// What to do then.
     pub remedy: String,
@@ -38,14 +38,19 @@ impl ControllerPoses {
 }
 
 impl ReadOtherwise {
+    /// What is wrong, as something fits if it is not.
+    pub fn says(&self, fits: &str) -> String {
+        format!("{} {fits}", self.what)
+    }
+
     pub(super) fn of_convention(poses: Vec<Option<Pose>>, name: &str, remedy: String) -> Self {
-        let what = format!("the rotations in controller.csv follow another convention: read as {name} the images fit");
+        let what = format!("the rotations in controller.csv follow another convention: read as {name}");
         Self { code: Code::RotationConvention, what, remedy, poses }
     }
 
     /// Rotations of the base in the flange beside positions of the flange in the base.
     pub(super) fn turned_back(poses: &[Option<Pose>]) -> Self {
-        let what = "the rotations in controller.csv are those of the base in the flange: with them inverted, and the positions as they are, the images fit".to_owned();
+        let what = "the rotations in controller.csv are those of the base in the flange: with them inverted, and the positions as they are,".to_owned();
         let remedy = "invert the rotations alone: negate qx, qy and qz (rx, ry, rz), transpose a matrix".to_owned();
         let poses = poses.iter().map(|p| p.map(|p| Pose::new(p.rotation.transpose(), p.translation))).collect();
         Self { code: Code::PosesInverted, what, remedy, poses }
@@ -54,8 +59,7 @@ impl ReadOtherwise {
     /// Poses of the base in the flange, where those of the flange in the base are wanted.
     pub(super) fn inverted(poses: &[Option<Pose>], convention: Option<&str>) -> Self {
         let read = convention.map_or_else(String::new, |name| format!(" and their rotations as {name}"));
-        let what =
-            format!("the poses in controller.csv are those of the base in the flange: inverted{read} the images fit");
+        let what = format!("the poses in controller.csv are those of the base in the flange: inverted{read}");
         let remedy =
             "invert every pose, or export the pose of the flange in the base; if they are right, the camera is \
                       mounted the other way (camera_mount in series.toml)"

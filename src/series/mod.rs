@@ -70,5 +70,5 @@ pub use spread::spread;
 pub use tag_plates::regions;
 pub use tags::{Region, TagPrint, Tags, dictionary_named};
 pub(crate) use toml_file::read_toml;
-pub use units::check_unit;
+pub use units::{LENGTH_UNITS, LengthUnit, check_unit};
 pub use without_robot::{read_without_robot, series_of_images};

@@ -17,11 +17,25 @@ const SOFT_LIMITS_RAD: f64 = 0.5;
 pub(super) const SMALL_DEG: f64 = 6.3;
 /// The same of a rail, m.
 const SOFT_LIMITS_M: f64 = 0.01;
-/// Units in which rails are read, beside metres, m.
-const LENGTHS: [(&str, &str, f64); 3] =
-    [("millimetres", "mm", 1e-3), ("centimetres", "cm", 1e-2), ("inches", "inch", 0.0254)];
+/// Units that lengths are recorded in, beside metres.
+pub const LENGTH_UNITS: [LengthUnit; 3] = [
+    LengthUnit { name: "millimetres", sign: "mm", metres: 1e-3 },
+    LengthUnit { name: "centimetres", sign: "cm", metres: 1e-2 },
+    LengthUnit { name: "inches", sign: "inch", metres: 0.0254 },
+];
 /// Fewer stops than this say nothing about their unit.
 const MANY_STOPS: usize = 3;
+
+/// A unit of length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LengthUnit {
+    /// What many of it are called.
+    pub name: &'static str,
+    /// Its sign behind a number.
+    pub sign: &'static str,
+    /// Its length, m.
+    pub metres: f64,
+}
 
 /// Readings of every stop in the order of `Chain::readings`, rad and m; `None` for images taken off the robot.
 ///
@@ -153,27 +167,23 @@ fn refuse_other_lengths(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<(
     let sliding = || (0..chain.readings.len()).filter(|&i| chain.reading_kinds[i] == JointKind::Prismatic);
     let of_most = |test: &dyn Fn(&[f64]) -> bool| 2 * rows.iter().filter(|q| test(q)).count() > rows.len();
     let keeps = |i: usize, q: &[f64], factor: f64, slack: f64| fits(chain, std::iter::once(i), q, factor, slack);
-    let units_of = |i: usize| -> Vec<&(&str, &str, f64)> {
-        let fit = |(_, _, factor): &&(&str, &str, f64)| {
-            of_most(&|q| !keeps(i, q, 1.0, 1.0) && keeps(i, q, *factor, SOFT_LIMITS_M))
-        };
-        LENGTHS.iter().filter(fit).collect()
+    let units_of = |i: usize| -> Vec<&LengthUnit> {
+        let fit = |unit: &&LengthUnit| of_most(&|q| !keeps(i, q, 1.0, 1.0) && keeps(i, q, unit.metres, SOFT_LIMITS_M));
+        LENGTH_UNITS.iter().filter(fit).collect()
     };
     let Some((reading, units)) = sliding().map(|i| (i, units_of(i))).find(|(_, units)| !units.is_empty()) else {
         return Ok(());
     };
     let (low, high) = range(rows, reading);
-    let joined = |one: &dyn Fn(&(&str, &str, f64)) -> String| {
-        units.iter().map(|unit| one(unit)).collect::<Vec<_>>().join(" or ")
-    };
+    let joined = |one: fn(&LengthUnit) -> String| units.iter().map(|unit| one(unit)).collect::<Vec<_>>().join(" or ");
     let what = format!(
         "{} reads {low} to {high}, beyond the limits in the URDF, which it keeps if it is in {}",
         chain.readings[reading],
-        joined(&|(name, ..)| (*name).to_owned())
+        joined(|unit| unit.name.to_owned())
     );
     let remedy = format!(
         "prismatic joints are metres: multiply the column by {}",
-        joined(&|(_, sign, m)| format!("{m} ({sign})"))
+        joined(|unit| format!("{} ({})", unit.metres, unit.sign))
     );
     Err(Error::new(Code::MillimetresAsMetres, file.display(), what, remedy))
 }
