@@ -51,7 +51,7 @@ pub const CHECKS: &[Check] = &[
         explains: |own, other| match (own, other) {
             (Finding::Displaced(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::Displaced(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
-            (Finding::FocusChange(own), Finding::LooseMounting(_)) => own.weight == Weight::Gate,
+            (Finding::FocusChange(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::FocusChange(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             (Finding::ZeroMoved(own), Finding::LooseMounting(_)) => own.explains_two_places(),
             (Finding::ZeroMoved(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
@@ -64,7 +64,10 @@ pub const CHECKS: &[Check] = &[
     },
     Check {
         // Another focal length looks like a plate that stands elsewhere.
-        explains: |_, other| matches!(other, Finding::Displaced(_)),
+        explains: |own, other| match (own, other) {
+            (Finding::FocusChange(own), Finding::Displaced(moved)) => own.looks_like(moved),
+            _ => false,
+        },
         ..check("focus", Stage::FreePoses(|p, s| found(focus::check(p, s))))
     },
     check("camera_model", Stage::FreePoses(|p, s| found(camera_model::check(p, s)))),
@@ -94,6 +97,11 @@ pub const CHECKS: &[Check] = &[
     check("extrapolates", Stage::Uncertainty(|a, b, s| found(extrapolates::check(a, b, s)))),
     check("undetermined", Stage::Uncertainty(|a, b, s| found(undetermined::check(a, b, s)))),
 ];
+
+/// True of what readings computed from poses of a tool, or in a frame, look like: there they are the finding.
+pub fn follows_from_tool(finding: &Finding) -> bool {
+    matches!(finding, Finding::JointNoiseLarge(_) | Finding::LooseMounting(_) | Finding::NoGain(_))
+}
 
 /// What the checks have found so far.
 pub struct Diagnosis<'a> {

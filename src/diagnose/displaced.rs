@@ -77,7 +77,7 @@ impl Displaced {
     }
 
     /// True where a tracker or contacts show it, not images.
-    fn is_measured(&self) -> bool {
+    pub(super) fn is_measured(&self) -> bool {
         matches!(self.body, Carried::Instrument | Carried::Target)
     }
 

@@ -1,5 +1,8 @@
 //! Did focus or zoom change within the series? Every image votes for a focal length of its own.
 
+use std::collections::BTreeSet;
+
+use super::displaced::Displaced;
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::fit::FocalLength;
@@ -10,6 +13,8 @@ use crate::problem::Problem;
 pub struct FocusChange {
     /// Camera.
     pub camera: String,
+    /// Its mountings.
+    pub mountings: BTreeSet<String>,
     /// First image after the change.
     pub image: String,
     /// Relative change of the focal length.
@@ -20,35 +25,50 @@ pub struct FocusChange {
     pub weight: Weight,
 }
 
-/// The most significant change along the order of the images of a camera; of the first camera that has one.
-pub(super) fn check(problem: &Problem, setting: &CheckContext) -> Option<FocusChange> {
-    let limits = setting.limits;
-    for (camera, name) in problem.cameras.iter().enumerate() {
-        let of_camera = problem.images.iter().enumerate().filter(|(_, image)| image.camera == camera);
-        let all = of_camera.filter_map(|(i, _)| Some((i, setting.free.poses[i].as_ref()?.focal?)));
-        let votes: Vec<(usize, FocalLength)> =
-            all.filter(|(_, focal)| focal.information > limits.focus_information).collect();
-        let values: Vec<f64> = votes.iter().map(|(_, focal)| focal.change).collect();
-        let mut best: Option<(f64, usize, f64)> = None;
-        for split in limits.focus_images..(values.len() + 1).saturating_sub(limits.focus_images) {
-            let (before, after) = values.split_at(split);
-            let ((m1, s1), (m2, s2)) = (mean_and_error(before), mean_and_error(after));
-            let change = m2 - m1;
-            let significance = change.abs() / s1.hypot(s2).max(1e-12);
-            if change.abs() > limits.focus_change
-                && significance > limits.focus_sigmas
-                && best.is_none_or(|b| significance > b.0)
-            {
-                best = Some((significance, split, change));
-            }
-        }
-        if let Some((significance, split, change)) = best {
-            let image = problem.images[votes[split].0].name.clone();
-            let (camera, weight) = (name.clone(), Weight::Gate);
-            return Some(FocusChange { camera, image, change, significance, weight });
-        }
+impl FocusChange {
+    /// Of a camera from this image on.
+    pub(super) fn of(problem: &Problem, camera: usize, image: String, size: (f64, f64), weight: Weight) -> Self {
+        let of_camera = problem.images.iter().filter(|image| image.camera == camera);
+        let mountings = of_camera.map(|image| problem.mountings[image.mounting].clone()).collect();
+        let (change, significance) = size;
+        Self { camera: problem.cameras[camera].clone(), mountings, image, change, significance, weight }
     }
-    None
+
+    /// True where a camera or a plate that seems to have moved is one that this camera sees so.
+    pub(super) fn looks_like(&self, moved: &Displaced) -> bool {
+        !moved.is_measured() && self.mountings.contains(&moved.mounting)
+    }
+
+    /// True where the camera on this mounting seems to have two places.
+    pub(super) fn explains_two_places_of(&self, mounting: &str) -> bool {
+        self.weight == Weight::Gate && self.mountings.contains(mounting)
+    }
+}
+
+/// The most significant change along the order of the images of every camera that has one.
+pub(super) fn check(problem: &Problem, setting: &CheckContext) -> Vec<FocusChange> {
+    (0..problem.cameras.len()).filter_map(|camera| of_camera(problem, camera, setting)).collect()
+}
+
+fn of_camera(problem: &Problem, camera: usize, setting: &CheckContext) -> Option<FocusChange> {
+    let limits = setting.limits;
+    let of_camera = problem.images.iter().enumerate().filter(|(_, image)| image.camera == camera);
+    let all = of_camera.filter_map(|(i, _)| Some((i, setting.free.poses[i].as_ref()?.focal?)));
+    let votes: Vec<(usize, FocalLength)> =
+        all.filter(|(_, focal)| focal.information > limits.focus_information).collect();
+    let values: Vec<f64> = votes.iter().map(|(_, focal)| focal.change).collect();
+    let of_split = |split: usize| {
+        let (before, after) = values.split_at(split);
+        let ((m1, s1), (m2, s2)) = (mean_and_error(before), mean_and_error(after));
+        (split, m2 - m1, (m2 - m1).abs() / s1.hypot(s2).max(1e-12))
+    };
+    let splits = limits.focus_images..(values.len() + 1).saturating_sub(limits.focus_images);
+    let counts =
+        |(_, change, sigmas): &(usize, f64, f64)| change.abs() > limits.focus_change && *sigmas > limits.focus_sigmas;
+    // Of equals the first.
+    let (split, change, sigmas) = splits.rev().map(of_split).filter(counts).max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let image = problem.images[votes[split].0].name.clone();
+    Some(FocusChange::of(problem, camera, image, (change, sigmas), Weight::Gate))
 }
 
 fn mean_and_error(values: &[f64]) -> (f64, f64) {

@@ -48,7 +48,7 @@ mod zeros_off;
 pub use agreement::agreement;
 pub use camera_model::CameraModelMisfit;
 pub use camera_pattern::{ResidualPattern, residual_pattern};
-pub use checks::{CHECKS, Check, Diagnosis, Stage};
+pub use checks::{CHECKS, Check, Diagnosis, Stage, follows_from_tool};
 pub use computed_postures::ComputedPostures;
 pub use displaced::{Carried, Displaced, Displacement};
 pub use exchanged_readings::ExchangedReadings;

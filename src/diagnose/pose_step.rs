@@ -199,7 +199,7 @@ fn refocused(
     setting: &CheckContext,
 ) -> Option<Finding> {
     let (problem, focal_px) = (&fit.problem, &fit.state.cameras[camera].parameters);
-    if focus::check(problem, setting).is_some() {
+    if focus::check(problem, setting).iter().any(|told| told.camera == problem.cameras[camera]) {
         return None;
     }
     let relative = |k: usize| step.change[k] / focal_px[k];
@@ -207,7 +207,7 @@ fn refocused(
     let (change, sigma) = (0.5 * (relative(0) + relative(1)), sigma(0).max(sigma(1)));
     let significance = change.abs() / sigma.max(f64::MIN_POSITIVE);
     let weight = if explains_most { Weight::Gate } else { Weight::Note };
-    Some(FocusChange { camera: problem.cameras[camera].clone(), image, change, significance, weight }.into())
+    Some(FocusChange::of(problem, camera, image, (change, significance), weight).into())
 }
 
 /// What stands elsewhere, and the name of its mounting, tracker or target.

@@ -15,7 +15,7 @@ use super::near_nominal::near_nominal;
 use super::options::{JointNoise, Options};
 use super::solution::{Evidence, LensEvidence, Solution};
 use super::turns;
-use crate::diagnose::ToolInPoses;
+use crate::diagnose::{ToolInPoses, follows_from_tool};
 use crate::error::{Notice, Result};
 use crate::fit::{Fit, log_evidence};
 use crate::linalg::SymmetricFactor;
@@ -80,7 +80,10 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let mut solution = Solution { evidences, lenses, ..fit.judged(&lensed, options.estimator)? };
     solution.findings.extend(notices.into_iter().map(Into::into));
     solution.findings.extend(of_postures.map(|t| t.finding(series, &told).into()));
-    solution.findings.extend(of_tool(&rigid, &told, options).map(Into::into));
+    if let Some(tool) = of_tool(&rigid, &told, options) {
+        solution.findings.retain(|other| !follows_from_tool(other));
+        solution.findings.push(tool.into());
+    }
     let losses = lens_choice::losses(&solution);
     solution.findings.extend(losses.into_iter().map(Into::into));
     Ok(Solution { options: options.clone(), ..solution })
