@@ -66,7 +66,7 @@ pub(super) fn parts_of(recording: &Path) -> Result<Parts> {
         }
     };
     match files.is_empty() {
-        true => Err(holds_none(recording, &all)?),
+        true => Err(holds_none(recording, &all, &missing)?),
         false => Ok(Parts { files, notices }),
     }
 }
@@ -132,7 +132,7 @@ fn refuse_packed<'a>(files: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
     }
 }
 
-fn holds_none(recording: &Path, all: &[PathBuf]) -> Result<Error> {
+fn holds_none(recording: &Path, all: &[PathBuf], missing: &[&String]) -> Result<Error> {
     if let Some(other) = [PACKED, ".bag"].iter().find_map(|end| all.iter().find(|path| ends(path, end))) {
         return Ok(not_recording(other, &head(other)?));
     }
@@ -140,14 +140,21 @@ fn holds_none(recording: &Path, all: &[PathBuf]) -> Result<Error> {
         true => "a series folder becomes a recording: let the second name end in .mcap",
         false => "give an .mcap file, or a rosbag2 folder with .mcap or .db3 files",
     };
-    Ok(Error::new(Code::RecordingFormat, recording.display(), "holds no .mcap or .db3 file", remedy))
+    let mut what = "holds no .mcap or .db3 file".to_owned();
+    if !missing.is_empty() {
+        what = format!("{what}; its metadata.yaml lists {}", joined(missing));
+    }
+    Ok(Error::new(Code::RecordingFormat, recording.display(), what, remedy))
+}
+
+fn joined(names: &[&String]) -> String {
+    names.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ")
 }
 
 fn lacking(recording: &Path, missing: &[&String]) -> Option<Notice> {
-    let names: Vec<&str> = missing.iter().map(|name| name.as_str()).collect();
-    let what = format!("lacks what its metadata.yaml lists: {}", names.join(", "));
+    let what = format!("lacks what its metadata.yaml lists: {}", joined(missing));
     let remedy = "copy it again, or record its stops again";
-    (!names.is_empty()).then(|| Notice::new(Code::RecordingDamaged, recording.display(), what, remedy))
+    (!missing.is_empty()).then(|| Notice::new(Code::RecordingDamaged, recording.display(), what, remedy))
 }
 
 fn not_listed<'a>(recording: &Path, others: impl Iterator<Item = &'a PathBuf>) -> Option<Notice> {
