@@ -127,7 +127,7 @@ pub fn expected_errors(program: &Program, done: &Compensated, model: &FoundModel
         let TargetOutcome::Done(c) = outcome else { return None };
         let tool = match &target.kind {
             TargetKind::Pose(pose) => pose.flange_from_tool,
-            TargetKind::Joints(_) => Pose::identity(),
+            TargetKind::Joints(joints) => joints.frames[0].pose().unwrap_or_else(Pose::identity),
         };
         Some(sigma_in_base(&model.robot, &model.layout, &model.covariance, &c.corrected, &tool))
     };
@@ -140,7 +140,7 @@ pub fn expected_with_frames(program: &Program, done: &Compensated, sides: &[Fram
         let TargetOutcome::Done(c) = outcome else { return None };
         let own = match &target.kind {
             TargetKind::Pose(pose) => pose.flange_from_tool,
-            TargetKind::Joints(_) => Pose::identity(),
+            TargetKind::Joints(joints) => joints.frames[0].pose().unwrap_or_else(Pose::identity),
         };
         let square = |side: &FramedRobot| {
             let tool = side.tool.unwrap_or(own);

@@ -188,6 +188,7 @@ impl Itinerary {
             Some(&known) if !has_frames_of(&self.program.targets[known].kind, &target.kind) => return false,
             Some(&known) => {
                 self.keep_codes(known, &target.kind);
+                self.keep_frames(known, &target.kind);
                 known
             }
             None => self.program.targets.len(),
@@ -209,6 +210,12 @@ impl Itinerary {
             && again.posture.codes().is_some()
         {
             first.posture = again.posture.clone();
+        }
+    }
+
+    fn keep_frames(&mut self, index: usize, again: &TargetKind) {
+        if let (TargetKind::Joints(first), TargetKind::Joints(again)) = (&mut self.program.targets[index].kind, again) {
+            first.again(&again.frames);
         }
     }
 

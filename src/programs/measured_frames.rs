@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::frame_candidates::{Candidates, MeasuredTool, Reference, SameFrames};
-use super::program::{Target, TargetKind, Understood};
+use super::program::{StatedFrame, Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
 
@@ -31,7 +31,7 @@ pub struct MeasuredFrames {
     pub from: Option<RobotFrames>,
     /// Where the places are given in the base itself: distance and angle from the base of the model beyond which it is another frame, m and rad.
     pub base_within: Option<(f64, f64)>,
-    /// The tool as the user states it: that of targets that are joint values, and the one that was measured where the program has several.
+    /// The tool as the user states it: that of targets that are joint values and whose text says none, and the one that was measured where the program has several.
     pub tool: Option<Pose>,
     /// The work object, likewise.
     pub work: Option<Pose>,
@@ -70,14 +70,35 @@ pub(super) struct FramesOfProgram<'a> {
     works: Candidates,
 }
 
-/// A tool and a work object of a program: `flange_from_tool`, `base_from_work`, where they are known.
-fn own_frames(kind: &TargetKind, measured: &MeasuredFrames) -> (Option<Pose>, Option<Pose>) {
+/// A tool and a work object of a program: `flange_from_tool`, `base_from_work`.
+fn own_frames(kind: &TargetKind, measured: &MeasuredFrames) -> [StatedFrame; 2] {
     match kind {
         TargetKind::Pose(pose) => {
             let stated = measured.work.filter(|_| measured.unsaid == Some(pose.base_from_work));
-            (Some(pose.flange_from_tool), stated.or(Some(pose.base_from_work)))
+            [pose.flange_from_tool, stated.unwrap_or(pose.base_from_work)].map(StatedFrame::One)
         }
-        TargetKind::Joints(_) => (measured.tool, measured.work),
+        TargetKind::Joints(joints) => {
+            let [tool, work] = *joints.frames;
+            [tool.else_as_stated(measured.tool), work.else_as_stated(measured.work)]
+        }
+    }
+}
+
+/// The frame of a target, where it is known.
+fn known(own: StatedFrame, reason: LeftReason, word: &str, flag: &str) -> Understood<Pose> {
+    match own {
+        StatedFrame::One(pose) => Ok(pose),
+        StatedFrame::Unsaid => {
+            let words = format!(
+                "the {word} was measured, and the text does not tell which {word} these joints mean: give it with {flag}"
+            );
+            Err(Why::new(reason, words))
+        }
+        StatedFrame::Several => {
+            let words =
+                format!("the {word} was measured, and these joints are used with several: give them a target for each");
+            Err(Why::new(reason, words))
+        }
     }
 }
 
@@ -86,9 +107,9 @@ impl<'a> FramesOfProgram<'a> {
     pub fn new(measured: &'a MeasuredFrames, targets: &[Target]) -> Self {
         let (mut tools, mut works) = (Vec::new(), Vec::new());
         for target in targets {
-            let (tool, work) = own_frames(&target.kind, measured);
-            tools.extend(tool);
-            works.extend(work);
+            let [tool, work] = own_frames(&target.kind, measured);
+            tools.extend(tool.pose());
+            works.extend(work.pose());
         }
         let tool = measured.to.tool.map(|to| Reference::tool(to, &measured.same));
         let work = measured.to.work.map(|to| Reference::work(to, &measured.same));
@@ -102,13 +123,13 @@ impl<'a> FramesOfProgram<'a> {
 
     /// What becomes of a target; else why it cannot be told.
     pub fn moved(&self, kind: &TargetKind) -> Understood<Moved> {
-        let (own_tool, own_work) = own_frames(kind, self.measured);
+        let [own_tool, own_work] = own_frames(kind, self.measured);
         let (tool, base) = (self.tool(own_tool)?, self.base(own_work)?);
         let point = self.measured.to.tool.map(|t| Pose::new(Matrix3::identity(), t.point()));
-        Ok(Moved { base, tool, flange_from_tool: point.or(own_tool).unwrap_or_else(Pose::identity) })
+        Ok(Moved { base, tool, flange_from_tool: point.or(own_tool.pose()).unwrap_or_else(Pose::identity) })
     }
 
-    fn tool(&self, own: Option<Pose>) -> Understood<Pose> {
+    fn tool(&self, own: StatedFrame) -> Understood<Pose> {
         let from = self.measured.from.as_ref().map(|f| f.tool);
         let (to, own) = match (&self.measured.to.tool, from) {
             (None, _) => return Ok(Pose::identity()),
@@ -116,17 +137,12 @@ impl<'a> FramesOfProgram<'a> {
             (Some(to), _) => (to, own),
         };
         let unknown = |words: String| Why::new(LeftReason::ToolUnknown, words);
-        let own = own.ok_or_else(|| {
-            unknown(
-                "the tool was measured, and the text does not tell which tool these joints mean: give it with --tool"
-                    .into(),
-            )
-        })?;
+        let own = known(own, LeftReason::ToolUnknown, "tool", "--tool")?;
         self.tools.check(&own).map_err(|why| unknown(why.in_words("tool", "--tool")))?;
         Ok(MeasuredTool::Pose(own).onto(to))
     }
 
-    fn base(&self, own: Option<Pose>) -> Understood<Pose> {
+    fn base(&self, own: StatedFrame) -> Understood<Pose> {
         let from = self.measured.from.as_ref().map(|f| f.work);
         let unknown = |words: String| Why::new(LeftReason::FrameUnknown, words);
         let to = match (&self.measured.to.work, from) {
@@ -146,9 +162,7 @@ impl<'a> FramesOfProgram<'a> {
             }
             return Ok(*to);
         }
-        let own = own.ok_or_else(|| {
-            unknown("the work object was measured, and the text does not tell which one these joints mean: give it with --work".into())
-        })?;
+        let own = known(own, LeftReason::FrameUnknown, "work object", "--work")?;
         self.works.check(&own).map_err(|why| unknown(why.in_words("work object", "--work")))?;
         Ok(*to * own.inverse())
     }

@@ -160,6 +160,46 @@ pub struct JointTarget {
     pub readings: Vec<f64>,
     /// Their numbers in the text; `None` for those that are held: external axes, and axes that the target does not have.
     pub fields: Vec<Option<Field>>,
+    /// `flange_from_tool` and `base_from_work` that the text has on the way there.
+    pub frames: Box<[StatedFrame; 2]>,
+}
+
+/// A tool or a work object, as a text has it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum StatedFrame {
+    /// It has none, or that of the flange or the base, which is what is set where nobody thinks of one.
+    #[default]
+    Unsaid,
+    /// This one.
+    One(Pose),
+    /// One now, another at another time.
+    Several,
+}
+
+impl StatedFrame {
+    /// One that the text has, if it is known, beside that which stands where none was chosen.
+    pub(super) fn beside(none: &Pose, known: Option<Pose>) -> Self {
+        known.filter(|pose| pose != none).map_or(Self::Unsaid, Self::One)
+    }
+
+    /// The one that it has, if it has one.
+    pub fn pose(self) -> Option<Pose> {
+        if let Self::One(pose) = self { Some(pose) } else { None }
+    }
+
+    /// That which is stated beside the text, where the text has none.
+    pub(super) fn else_as_stated(self, stated: Option<Pose>) -> Self {
+        if self == Self::Unsaid { stated.map_or(self, Self::One) } else { self }
+    }
+
+    /// Of a target to which the robot goes again.
+    fn again(self, other: Self) -> Self {
+        match (self, other) {
+            (one, Self::Unsaid) | (Self::Unsaid, one) => one,
+            (one, other) if one == other => one,
+            _ => Self::Several,
+        }
+    }
 }
 
 /// A pose of the tool in a work object, as the controller computes it with its own model.
@@ -397,6 +437,11 @@ fn abc_near(rotation: &nalgebra::Matrix3<f64>, old: [f64; 3]) -> [f64; 3] {
 }
 
 impl JointTarget {
+    /// The robot goes there again, with these frames.
+    pub(super) fn again(&mut self, frames: &[StatedFrame; 2]) {
+        self.frames.iter_mut().zip(frames).for_each(|(own, again)| *own = own.again(*again));
+    }
+
     /// Edits that write other readings, and the readings that a reader of the new text finds.
     pub fn edits(&self, readings: &[f64], files: &[TextFile]) -> (Vec<Edit>, Vec<f64>) {
         write_joints(&self.fields, readings, files)

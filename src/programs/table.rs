@@ -176,7 +176,8 @@ impl Table<'_> {
     fn joints(&self, row: &Row) -> Result<JointTarget> {
         let fields = self.joint_fields(row)?;
         let readings = fields.iter().map(Field::value).collect();
-        Ok(JointTarget { readings, fields: fields.into_iter().map(Some).collect() })
+        let fields = fields.into_iter().map(Some).collect();
+        Ok(JointTarget { readings, fields, frames: Default::default() })
     }
 
     fn joint_fields(&self, row: &Row) -> Result<Vec<Field>> {

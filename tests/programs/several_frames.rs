@@ -192,3 +192,68 @@ fn joint_columns_that_contradict_the_pose_of_their_row_leave_it() {
     assert_eq!([of(0.0), of(0.05)], [[None], [None]], "joints say the posture, roughly");
     assert_eq!(of(0.6), [Some(LeftReason::PostureUnknown)]);
 }
+
+/// Joint values belong to the tool that their text has, whatever tool is stated for those whose text has none.
+#[test]
+fn joints_take_the_tool_of_their_text() {
+    let cell = Cell::kuka(316);
+    let tool = Pose::from_xyz_rpy([0.01, -0.02, 0.15], [0.0, 0.4, 1.2]);
+    let near = moved(&tool, 0.002);
+    let other = Pose::from_xyz_rpy([0.2, 0.0, 0.05], [0.0, 1.0, 0.0]);
+    let to = RobotFrames { tool: Some(MeasuredTool::Pose(tool)), work: None };
+    let done =
+        |name: &str, text: &str| corrected(&cell, name, text, to, &Stated { tool: Some(near), ..Stated::default() });
+    let deg = READINGS.map(|q| format!("{:.6}", q.to_degrees()));
+    let axes = (1..=6).zip(&deg).map(|(k, q)| format!("A{k} {q}")).collect::<Vec<_>>().join(",");
+    let go = |tool: &Pose| format!("$TOOL={}\nPTP {{{axes}}}\n", krl(tool));
+    let of_krl = |body: String| done("a.src", &format!("DEF a()\n{body}END\n"));
+    let left_with_another: Option<LeftReason> = Some(LeftReason::ToolUnknown);
+    assert_eq!(left(&of_krl(go(&near) + &go(&other))), [None, left_with_another]);
+    assert_eq!(left(&of_krl(go(&Pose::identity()))), [None], "no tool was chosen");
+    let stated = of_krl(go(&Pose::identity()));
+    let own = of_krl(go(&moved(&tool, 0.001)));
+    let TargetOutcome::Done(correction) = &own.outcomes[0] else { panic!("{:?}", own.outcomes) };
+    let wanted = cell.nominal.base_from_tip(&READINGS) * moved(&tool, 0.001) * tool.inverse();
+    assert_meets(&cell.real.base_from_tip(&correction.corrected), &wanted, "its own tool");
+    let TargetOutcome::Done(by_stated) = &stated.outcomes[0] else { panic!("{:?}", stated.outcomes) };
+    assert!((by_stated.shift_m - correction.shift_m).abs() > 5e-4, "{by_stated:?} {correction:?}");
+
+    let [qw, qx, qy, qz] = {
+        let [x, y, z, w] = other.quaternion_xyzw();
+        [w, x, y, z]
+    };
+    let [x, y, z] = other.xyz().map(|v| 1e3 * v);
+    let data = format!("[TRUE,[[{x},{y},{z}],[{qw},{qx},{qy},{qz}]],[1,[0,0,0],[1,0,0,0],0,0,0]]");
+    let place = format!("[[{}],[9E9,9E9,9E9,9E9,9E9,9E9]]", deg.join(","));
+    let rapid = format!(
+        "MODULE m\nPERS tooldata t2:={data};\nCONST jointtarget j1:={place};\nPROC main()\nMoveAbsJ j1,v100,fine,t2;\nENDPROC\nENDMODULE\n"
+    );
+    assert_eq!(left(&done("m.mod", &rapid)), [left_with_another]);
+    let script = |tool: &Pose| {
+        let axis = nalgebra::Rotation3::from_matrix(&tool.rotation).scaled_axis();
+        let [x, y, z] = tool.xyz();
+        let q = READINGS.map(|q| q.to_string()).join(",");
+        format!("def a():\n  set_tcp(p[{x},{y},{z},{},{},{}])\n  movej([{q}])\nend\n", axis.x, axis.y, axis.z)
+    };
+    assert_eq!(
+        [left(&done("a.script", &script(&near))), left(&done("a.script", &script(&other)))],
+        [vec![None], vec![left_with_another]]
+    );
+}
+
+/// A declared joint target to which the robot goes with two tools has none of them.
+#[test]
+fn joints_used_with_two_tools_are_left() {
+    let cell = Cell::kuka(317);
+    let tool = Pose::from_xyz_rpy([0.01, -0.02, 0.15], [0.0, 0.4, 1.2]);
+    let to = RobotFrames { tool: Some(MeasuredTool::Pose(tool)), work: None };
+    let axes = (1..=6).zip(READINGS).map(|(k, q)| format!("A{k} {:.6}", q.to_degrees())).collect::<Vec<_>>().join(",");
+    let of = |tools: [&Pose; 2]| {
+        let goes: String = tools.iter().map(|t| format!("$TOOL={}\nPTP XP1\n", krl(t))).collect();
+        let text = format!("DEF a()\nDECL E6AXIS XP1={{{axes}}}\n{goes}END\n");
+        left(&corrected(&cell, "a.src", &text, to, &Stated::default()))
+    };
+    let other = moved(&tool, 0.1);
+    assert_eq!(of([&tool, &Pose::identity()]), [None]);
+    assert_eq!(of([&tool, &other]), [Some(LeftReason::ToolUnknown)]);
+}

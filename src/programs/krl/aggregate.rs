@@ -154,7 +154,11 @@ impl Aggregate {
 
     /// Axis values by reading; external axes keep theirs and have no field.
     pub fn joints(&self, axes: &[usize], prismatic: &[bool]) -> JointTarget {
-        let mut target = JointTarget { readings: vec![f64::NAN; axes.len()], fields: vec![None; axes.len()] };
+        let mut target = JointTarget {
+            readings: vec![f64::NAN; axes.len()],
+            fields: vec![None; axes.len()],
+            frames: Default::default(),
+        };
         for (k, &reading) in axes.iter().enumerate() {
             let (_, field) = self.axis_field(k, prismatic[reading]);
             target.readings[reading] = field.value();

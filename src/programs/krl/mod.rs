@@ -33,7 +33,7 @@ use super::ProgramSetting;
 use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::names::{plain_error, plain_names};
-use super::program::{Left, PoseTarget, Program, TargetKind, Understood};
+use super::program::{JointTarget, Left, PoseTarget, Program, StatedFrame, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use super::references::References;
 use super::routines::Routines;
@@ -367,7 +367,12 @@ impl Module<'_> {
     fn kind(&self, a: &Aggregate, frames: &Frames) -> Understood<TargetKind> {
         let axes = self.setting.axes;
         if a.has(&AXIS_NAMES) {
-            return Ok(TargetKind::Joints(a.joints(axes, &self.prismatic)));
+            let known = |is: &FrameIs| if let FrameIs::Known(pose) = is { Some(*pose) } else { None };
+            let (tool, base) = (known(&frames.tool), known(&frames.base));
+            let none = Pose::identity();
+            let work = StatedFrame::beside(&self.setting.base, base.map(|base| self.setting.base * base));
+            let frames = Box::new([StatedFrame::beside(&none, tool.filter(|_| !frames.tool_in_room)), work]);
+            return Ok(TargetKind::Joints(JointTarget { frames, ..a.joints(axes, &self.prismatic) }));
         }
         if !a.has(&POSE_NAMES) {
             let words = match a.has(&EXTERNAL_NAMES) {

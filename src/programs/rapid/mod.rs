@@ -21,8 +21,8 @@ use super::flow::{Places, settled};
 use super::itinerary::Itinerary;
 use super::names::{plain_error, plain_names};
 use super::program::{
-    Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
-    TargetKind, Understood,
+    Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, StatedFrame,
+    Target, TargetKind, Understood,
 };
 use super::reason::{DeclaredPoint, LeftReason, Why};
 use super::references::References;
@@ -341,7 +341,11 @@ impl Task<'_> {
         };
         let external = parts.last().and_then(numbers::<6>).unwrap_or_default();
         if parts.len() == 2 {
-            return Ok(TargetKind::Joints(self.joints(&parts[0], &external, file)?));
+            let (tool, base) = (tool.and_then(|name| self.tool(Some(name)).ok()), self.setting.base);
+            let work = work.ok().map(|work| base * work);
+            let frames = [(Pose::identity(), tool), (base, work)];
+            let frames = Box::new(frames.map(|(none, known)| StatedFrame::beside(&none, known)));
+            return Ok(TargetKind::Joints(JointTarget { frames, ..self.joints(&parts[0], &external, file)? }));
         }
         if self.switching.now().displaced.value {
             let words = "a program displacement (PDispOn, PDispSet) may be active";
@@ -407,7 +411,7 @@ impl Task<'_> {
         let values = numbers::<6>(axes)
             .ok_or_else(|| Why::new(LeftReason::Computed, "it is computed, not written in numbers"))?;
         let n = self.setting.axes.len();
-        let mut target = JointTarget { readings: vec![f64::NAN; n], fields: vec![None; n] };
+        let mut target = JointTarget { readings: vec![f64::NAN; n], fields: vec![None; n], frames: Default::default() };
         for (k, (&reading, (written, range))) in self.setting.axes.iter().zip(values.iter().chain(external)).enumerate()
         {
             if *written >= NO_AXIS {

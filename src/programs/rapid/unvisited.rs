@@ -63,9 +63,12 @@ impl Task<'_> {
                 return Err(Why::new(LeftReason::NotATarget, format!("{by} depends on it")));
             };
             let base = work.as_ref().map_or_else(untold, |work| self.work(Some(work)));
-            let kind = self.kind(value, file, tool.as_deref(), base)?;
+            let mut kind = self.kind(value, file, tool.as_deref(), base)?;
             if found.as_ref().is_some_and(|other| frames_of(other) != frames_of(&kind)) {
                 return Err(Why::new(LeftReason::FramesDiffer, "it is used with different tools or work objects"));
+            }
+            if let (TargetKind::Joints(joints), Some(TargetKind::Joints(before))) = (&mut kind, &found) {
+                joints.again(&before.frames);
             }
             found = Some(kind);
         }

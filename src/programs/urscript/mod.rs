@@ -13,7 +13,7 @@ use super::field::{Field, FieldPlace};
 use super::flow::{Branching, Flow, Followed, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::program::{
-    JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Understood,
+    JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, StatedFrame, Target, TargetKind, Understood,
 };
 use super::reason::{DeclaredPoint, LeftReason, Why};
 use super::routines::Routines;
@@ -453,7 +453,9 @@ impl Script<'_> {
                 for (field, &reading) in fields.into_iter().zip(self.setting.axes) {
                     by_reading[reading] = Some(field);
                 }
-                (TargetKind::Joints(JointTarget { readings, fields: by_reading }), line)
+                let tool = StatedFrame::beside(&Pose::identity(), argument.tool.ok());
+                let frames = Box::new([tool, StatedFrame::Unsaid]);
+                (TargetKind::Joints(JointTarget { readings, fields: by_reading, frames }), line)
             }
             Value::Pose(fields, line) => {
                 let pose = self.pose(*fields, argument.posture, argument.tool?);
