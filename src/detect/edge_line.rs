@@ -37,6 +37,8 @@ const NEARLY_AT_REST_PX: f64 = 5e-3;
 const LEVEL: f64 = 0.3;
 /// Prior sigma of a slope of the light along the side, as a share of the contrast per px; it may change by itself over the side.
 const SLOPE_PER_PX: f64 = 0.01;
+/// What lies beyond ink and paper is seen so many blurs before it: at two by 2 % of the contrast.
+const CLEAR_OF_BLURS: f64 = 2.0;
 /// A side that moves further than this part of its length, or by more than this many px, is another edge.
 const FARTHEST: f64 = 0.1;
 const FARTHEST_PX: f64 = 3.0;
@@ -122,7 +124,7 @@ impl EdgeLine {
     fn band(&self, picture: &Picture, side: &Side, length: f64, blur_px: f64) -> Result<Vec<Pixel>, &'static str> {
         let half = length / 2.0 - (2.5 * blur_px + 1.0).min(length / 4.0);
         let reach = 3.0 * blur_px + 1.0;
-        let room = |px: f64| reach.min((px - 1.5 * blur_px).max(0.5 * px).max(1.0));
+        let room = |px: f64| reach.min((px - CLEAR_OF_BLURS * blur_px).max(0.5 * px).max(1.0));
         let (inner, outer) = (room(side.ink_px), room(side.paper_px));
         let far = self.across * reach.max(1.0);
         let ends = [self.middle - self.along * half, self.middle + self.along * half];

@@ -210,7 +210,7 @@ impl<'a> Board<'a> {
     fn sides(&self, corners: &Quad) -> [Measured; 4] {
         [0, 1, 2, 3].map(|k: usize| {
             let (from, to) = (corners[k], corners[(k + 1) % 4]);
-            let module = distance(from, to) / self.reader.side() as f64;
+            let module = width(corners, k) / self.reader.side() as f64;
             let (ink_px, paper_px) = (module * self.reader.border() as f64, module * self.gap().min(2.0));
             EdgeLine::fit(self.picture, &Side { from: to, to: from, ink_px, paper_px })
         })
@@ -232,9 +232,9 @@ impl<'a> Board<'a> {
         for (place, four) in sides {
             let corners = found[place];
             for (k, side) in four.iter().enumerate().filter_map(|(k, side)| Some((k, side.as_ref().ok()?))) {
+                let px = 0.5 * share * width(&corners, k);
                 for (near, far) in [(corners[k], corners[(k + 1) % 4]), (corners[(k + 1) % 4], corners[k])] {
                     let end = [0, 1].map(|a| near[a] + share * (near[a] - far[a]));
-                    let px = 0.5 * share * distance(near, far);
                     // its light is where the ink of the tag is
                     let (from, to) = if near == corners[k] { (end, near) } else { (near, end) };
                     let square = EdgeLine::fit(self.picture, &Side { from, to, ink_px: px, paper_px: px });
@@ -277,6 +277,14 @@ fn clockwise([a, b, c, d]: &Quad) -> Quad {
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// Width of a tag across its side from corner `k` to the next, px: a tilted one is not as wide as it is long.
+fn width(corners: &Quad, k: usize) -> f64 {
+    let [from, to, far, last] = [0, 1, 2, 3].map(|i| corners[(k + i) % 4]);
+    let along = [to[0] - from[0], to[1] - from[1]];
+    let across = |p: [f64; 2]| along[0] * (p[1] - from[1]) - along[1] * (p[0] - from[0]);
+    (across(far) + across(last)).abs() / (2.0 * distance(from, to))
 }
 
 fn middle(q: &Quad) -> [f64; 2] {

@@ -52,6 +52,10 @@ struct Tally {
 
 /// As a camera that is exposed so that the paper is at this multiple of full scale sees a plate.
 fn run(text: &str, paper: f64) -> Tally {
+    run_views(text, paper, view)
+}
+
+fn run_views(text: &str, paper: f64, view: impl Fn(&mut ChaCha8Rng) -> View) -> Tally {
     let plate = plate(text);
     let mut tally = Tally::default();
     for seed in 0..views() {
@@ -102,6 +106,19 @@ fn every_kind_of_tags_is_found_and_measured() {
         assert!(tally.found as f64 >= 0.97 * tally.visible as f64, "{text}: {tally:?}");
         assert!(tally.bias.iter().all(|b| b.abs() < 0.02) && tally.normalised < 1.2, "{text}: {tally:?}");
     }
+}
+
+/// A tilted tag is narrow: what lies beyond its border, as wide as two or three blurs, must not count as the border.
+#[test]
+fn blurred_and_tilted_tags_are_as_uncertain_as_stated() {
+    let tally = run_views(APRILGRID, 0.72, |rng| {
+        let mut view =
+            View { distance_m: rng.random_range(0.4..0.55), tilt_deg: rng.random_range(50.0..60.0), ..view(rng) };
+        view.conditions.psf_sigma_px = rng.random_range(1.6..2.4);
+        view
+    });
+    assert_eq!(tally.wrong, 0);
+    assert!(tally.found > 300 && tally.normalised < 1.5, "{tally:?}");
 }
 
 /// Paper that is clipped makes the tags smaller and the squares between them, too: where they meet, nothing moves.
