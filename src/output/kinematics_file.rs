@@ -6,6 +6,7 @@ use sha2::{Digest, Sha256};
 
 use super::controller_files::postures;
 use super::text::{key, number};
+use super::ur_frames::{self, along_z};
 use crate::geom::Pose;
 use crate::model::robot::Robot;
 use crate::urdf::{Chain, JointKind, RobotDescription};
@@ -49,6 +50,8 @@ struct Reader {
     behind: Pose,
     /// The tip of the chain behind the last joint as the package has it, where it is fixed there.
     tip: Option<Pose>,
+    /// How far along its axis the package has the frame of every one of them, m.
+    slides: Vec<f64>,
 }
 
 /// Corrected origins of a robot in the layout that its own description reads, under the names of its joints where none does; `note`
@@ -91,20 +94,23 @@ fn recognised(description: &RobotDescription, chain: &Chain) -> Option<Reader> {
     if let Some(prefix) = first(UR[0].1) {
         let keyed: Vec<_> = UR.iter().map(|(key, joint)| ((*key).to_owned(), format!("{prefix}{joint}"))).collect();
         let flange = Flange::of(description, chain, &prefix, &keyed[5].1).filter(|_| all_along_z(&keyed))?;
-        return Some(Reader { package: Package::Ur, keyed, behind: flange.behind, tip: flange.tip });
+        let slides = vec![0.0; keyed.len()];
+        let in_place = Reader { package: Package::Ur, keyed, behind: flange.behind, tip: flange.tip, slides };
+        let nominal = <[Pose; 6]>::try_from(in_place.steps(chain)).ok()?;
+        return ur_frames::slides(&nominal).map(|slides| Reader { slides: slides.into(), ..in_place });
     }
     let prefix = first("joint1")?;
     let franka = numbered(&prefix, 7);
     let last = format!("{prefix}joint8");
     if all_along_z(&franka) && description.fixed_joint(&last).is_some() {
         let keyed = franka.into_iter().chain([("joint8".to_owned(), last)]).collect();
-        return Some(Reader { package: Package::Franka, keyed, behind: Pose::identity(), tip: None });
+        return Some(Reader::of_own_frames(Package::Franka, keyed));
     }
     let count = XARM.into_iter().find(|&count| all_along_z(&numbered(&prefix, count)))?;
     let (base, _) = description.joint_links(&format!("{prefix}joint1"))?;
     let keyed = numbered(&prefix, count);
     let of_xarm = base == format!("{prefix}link_base") && chain.readings.len() == count;
-    of_xarm.then_some(Reader { package: Package::XArm, keyed, behind: Pose::identity(), tip: None })
+    of_xarm.then(|| Reader::of_own_frames(Package::XArm, keyed))
 }
 
 /// The flange of a robot of Universal Robots. In ur_description it is the frame of the last joint.
@@ -151,23 +157,43 @@ fn numbers(indent: &str, origin: &Pose) -> String {
 }
 
 impl Reader {
+    /// Of a package whose frames are those of the URDF.
+    fn of_own_frames(package: Package, keyed: Vec<(String, String)>) -> Self {
+        Self { package, slides: vec![0.0; keyed.len()], keyed, behind: Pose::identity(), tip: None }
+    }
+
+    /// Nominal origins of the joints with a key, each in the frame of the one before.
+    fn steps(&self, chain: &Chain) -> Vec<Pose> {
+        let mut steps = Vec::new();
+        let mut from_before = Pose::identity();
+        for joint in &chain.joints {
+            from_before = from_before * joint.origin;
+            if self.key_of(&joint.name).is_some() {
+                steps.push(std::mem::replace(&mut from_before, Pose::identity()));
+            }
+        }
+        steps
+    }
+
     fn key_of(&self, joint: &str) -> Option<usize> {
         self.keyed.iter().position(|(_, name)| name == joint)
     }
 
     /// Origins of the chain as the description will have them: those with a key take up the corrections of the fixed joints before
-    /// them, which have none; all others are nominal.
+    /// them, which have none, and slide along their axes; all others are nominal.
     fn origins(&self, robot: &Robot) -> Vec<Pose> {
         let joints = &robot.chain.joints;
         let corrected = robot.corrected_origins();
         let mut read: Vec<Pose> = joints.iter().map(|j| j.origin).collect();
-        let (mut nominal, mut moved) = (Pose::identity(), Pose::identity());
+        let (mut nominal, mut moved, mut before_m) = (Pose::identity(), Pose::identity(), 0.0);
         for (k, joint) in joints.iter().enumerate() {
-            let keyed = self.key_of(&joint.name).is_some();
-            if keyed {
-                read[k] = nominal.inverse() * moved * corrected[k];
+            let key = self.key_of(&joint.name);
+            if let Some(key) = key {
+                let slide_m = self.slides[key];
+                read[k] = nominal.inverse() * along_z(-before_m) * moved * corrected[k] * along_z(slide_m);
+                before_m = slide_m;
             }
-            match keyed || joint.drive.is_some() {
+            match key.is_some() || joint.drive.is_some() {
                 true => (nominal, moved) = (Pose::identity(), Pose::identity()),
                 false => (nominal, moved) = (nominal * joint.origin, moved * corrected[k]),
             }

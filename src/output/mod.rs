@@ -63,6 +63,7 @@ pub mod solution_json;
 mod solution_record;
 pub mod stand_alone_files;
 mod text;
+mod ur_frames;
 pub mod verdict;
 pub mod work_findings;
 mod write;

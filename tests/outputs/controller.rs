@@ -323,6 +323,10 @@ fn the_flange_of_a_ur_is_found_whatever_its_link_is_called() {
         let file: File = serde_saphyr::from_str(&yaml).unwrap();
         assert!((file.kinematics.wrist_3.y - 0.11655).abs() < 5e-3, "{yaml}");
         assert_same("ur10e", read_by_ur_description(&file, Pose::identity(), &q), flange);
+        // The frames of the URDF stand elsewhere along the axes; bodies hang on those of ur_description.
+        let k = &file.kinematics;
+        let along = [k.shoulder.z - 0.1807, k.upper_arm.z, k.wrist_1.z - 0.17415, k.wrist_2.y + 0.11985];
+        assert!(along.iter().all(|m| m.abs() < 5e-3), "{yaml}");
         assert!(!yaml.contains("WARNING"), "{yaml}");
     }
     // A camera beside the flange, whose own frame has no link: nobody knows where tool0 is to be.
