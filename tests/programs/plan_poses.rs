@@ -437,6 +437,31 @@ fn a_positioner_is_an_external_axis_of_the_planned_programs() {
     assert!(!files.contains_key("robotcal_plan.script"));
 }
 
+/// Nobody may drive a program through a table that the plan knows to stand in the way.
+#[test]
+fn the_planned_programs_stop_where_no_straight_way_is_free() {
+    let request = request("ur10e", 4);
+    let mut chosen = plan(&request).unwrap();
+    chosen.legs.iter_mut().for_each(|leg| leg.is_free = true);
+    let stops = |plan: &Plan, name: &str, word: &str| {
+        let files = robotcal::output::plan_programs::programs(&request, plan);
+        let text = String::from_utf8(files[&format!("robotcal_plan.{name}")].clone()).unwrap();
+        let halts = text.lines().enumerate().filter(|(_, line)| line.contains(word));
+        halts.map(|(k, _)| text.lines().nth(k + 1).unwrap_or_default().to_owned()).collect::<Vec<_>>()
+    };
+    let words = [("src", "HALT", "PTP XP"), ("mod", "Stop;", "    MoveAbsJ p"), ("script", "popup(", "  movej([")];
+    let free = words.map(|(name, word, _)| stops(&chosen, name, word).len());
+    let pauses = stops(&chosen, "trajectory.yaml", "teach:").len();
+    chosen.legs[2].is_free = false;
+    chosen.legs[2].via.clear();
+    for ((name, word, motion), free) in words.into_iter().zip(free) {
+        let halts = stops(&chosen, name, word);
+        assert_eq!(halts.len(), free + 1, "{name}");
+        assert!(halts.iter().any(|next| next.starts_with(motion)), "{name}: {halts:?}");
+    }
+    assert_eq!((pauses, stops(&chosen, "trajectory.yaml", "teach:").len()), (0, 1));
+}
+
 #[test]
 fn names_cannot_become_statements_of_the_planned_programs() {
     let mut request = request("ur10e", 4);

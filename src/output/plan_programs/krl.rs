@@ -1,6 +1,6 @@
 //! KUKA KRL: a .src with the motions and a .dat with the axis positions.
 
-use super::route::{Axes, EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, harmless};
+use super::route::{Axes, EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S};
 
 /// External axes, E1 and so on.
 const EXTERNAL: usize = 6;
@@ -16,8 +16,8 @@ pub(super) fn source(route: &Route<'_>) -> Option<String> {
         route.axis_list()
     );
     for (k, visit) in route.visits.iter().enumerate() {
-        if let Purpose::MovePlate(place, _) = &visit.purpose {
-            text += &format!("; Move the plate to {}, then continue\nHALT\n", harmless(place));
+        for halt in visit.halts() {
+            text += &format!("; {halt}, then continue\nHALT\n");
         }
         text += &format!("PTP XP{k}\n");
         if let Purpose::Image(image) | Purpose::MovePlate(_, image) = &visit.purpose {

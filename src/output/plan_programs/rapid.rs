@@ -1,6 +1,6 @@
 //! ABB RAPID: one module with joint targets.
 
-use super::route::{ARM_AXES, Axes, EXPOSE_S, PULSE_S, Purpose, Route, SETTLE_S, harmless};
+use super::route::{ARM_AXES, Axes, EXPOSE_S, PULSE_S, Purpose, Route, SETTLE_S};
 
 /// External axes in a joint target.
 const EXTERNAL: usize = 6;
@@ -24,9 +24,8 @@ pub(super) fn module(route: &Route<'_>) -> Option<String> {
         };
         let (arm, external) = (cells(arm, ARM_AXES, "0"), cells(external, EXTERNAL, ABSENT));
         targets += &format!("  CONST jointtarget p{k} := [[{arm}],[{external}]];\n");
-        if let Purpose::MovePlate(place, _) = &visit.purpose {
-            let place = harmless(place);
-            body += &format!("    TPWrite \"Move the plate to {place}, then start\";\n    Stop;\n");
+        for halt in visit.halts() {
+            body += &format!("    TPWrite \"{halt}, then start\";\n    Stop;\n");
         }
         body += &format!("    MoveAbsJ p{k}\\NoEOffs, v100, fine, tool0;\n");
         if let Purpose::Image(image) | Purpose::MovePlate(_, image) = &visit.purpose {

@@ -1,6 +1,6 @@
 //! ROS: a `trajectory_msgs/JointTrajectory` as YAML, with the times of the triggers beside it.
 
-use super::route::{EXPOSE_S, Purpose, Route, SETTLE_S};
+use super::route::{EXPOSE_S, Purpose, Route, SETTLE_S, TEACH};
 use crate::output::text::{list, quoted};
 
 /// Seconds and nanoseconds of a time.
@@ -9,7 +9,7 @@ fn duration(time_s: f64) -> String {
     format!("{{sec: {}, nanosec: {}}}", nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000)
 }
 
-/// The whole file: `trajectory` is the message, `triggers` says when to take which image, `pauses` when to move the plate.
+/// The whole file: `trajectory` is the message, `triggers` says when to take which image, `pauses` when to move the plate, and where no straight way is free.
 pub(super) fn trajectory(route: &Route<'_>) -> String {
     let mut points = String::new();
     let (mut triggers, mut pauses) = (String::new(), String::new());
@@ -26,6 +26,9 @@ pub(super) fn trajectory(route: &Route<'_>) -> String {
     for visit in &route.visits {
         if let Purpose::MovePlate(place, _) = &visit.purpose {
             pauses += &format!("  - {{time_s: {time_s:?}, move_plate_to: {}}}\n", quoted(place));
+        }
+        if !visit.way_is_free {
+            pauses += &format!("  - {{time_s: {time_s:?}, teach: {}}}\n", quoted(TEACH));
         }
         time_s += visit.time_s;
         point(&visit.readings, time_s);

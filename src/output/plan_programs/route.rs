@@ -42,6 +42,22 @@ pub(super) struct Visit {
     pub purpose: Purpose,
     /// Time of the motion, s.
     pub time_s: f64,
+    /// False where the straight way there touches something.
+    pub way_is_free: bool,
+}
+
+/// What an operator is asked for where no straight way is free.
+pub(super) const TEACH: &str = "The straight way from here is not free: teach a posture in between";
+
+impl Visit {
+    /// What an operator has to do before the motion.
+    pub fn halts(&self) -> Vec<String> {
+        let plate = match &self.purpose {
+            Purpose::MovePlate(place, _) => Some(format!("Move the plate to {}", harmless(place))),
+            _ => None,
+        };
+        plate.into_iter().chain((!self.way_is_free).then(|| TEACH.to_owned())).collect()
+    }
 }
 
 /// What every writer needs.
@@ -82,7 +98,8 @@ impl<'a> Route<'a> {
             let ways = leg.via.iter().map(|q| (q.clone(), Purpose::Pass));
             for (readings, purpose) in ways.chain([(stop.readings.clone(), purpose)]) {
                 let length = visits.last().map_or(0.0, |v| motion(&v.readings, &readings));
-                visits.push(Visit { readings, purpose, time_s: (length / SPEED).max(LEAST_TIME_S) });
+                let time_s = (length / SPEED).max(LEAST_TIME_S);
+                visits.push(Visit { readings, purpose, time_s, way_is_free: leg.is_free });
             }
         }
         Self { joints: &chain.readings, kinds: &chain.reading_kinds, external: external_axes(chain), visits }

@@ -1,6 +1,6 @@
 //! Universal Robots URScript.
 
-use super::route::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, SPEED, harmless};
+use super::route::{EXPOSE_S, NAME, PULSE_S, Purpose, Route, SETTLE_S, SPEED};
 use crate::urdf::JointKind;
 
 /// Joints of every arm of this maker.
@@ -14,9 +14,8 @@ pub(super) fn script(route: &Route<'_>) -> Option<String> {
     let mut text = format!("def {NAME}():\n  # Joints in order: {}\n", route.joint_list());
     for visit in &route.visits {
         let q: Vec<String> = visit.readings.iter().map(|q| format!("{q:.7}")).collect();
-        if let Purpose::MovePlate(place, _) = &visit.purpose {
-            let place = harmless(place);
-            text += &format!("  popup(\"Move the plate to {place}\", blocking=True)\n");
+        for halt in visit.halts() {
+            text += &format!("  popup(\"{halt}\", blocking=True)\n");
         }
         text += &format!("  movej([{}], a=0.5, v={SPEED:?})\n", q.join(", "));
         if let Purpose::Image(image) | Purpose::MovePlate(_, image) = &visit.purpose {
