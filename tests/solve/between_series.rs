@@ -127,3 +127,32 @@ fn a_camera_that_was_moved_on_its_mount_between_two_series_is_named() {
     let solution = solved(&apart);
     assert!(solution.failed_gates().is_empty(), "the remedy does not help: {:?}", solution.findings);
 }
+
+/// Each is told of its own camera.
+#[test]
+fn a_focus_that_changes_on_one_camera_hides_no_move_of_another() {
+    let mut made = seen(27);
+    let first = made.stops.stops[0].placement.clone();
+    let rows = |is_first: bool| -> Vec<usize> {
+        (0..STOPS).filter(|k| (made.stops.stops[*k].placement == first) == is_first).collect()
+    };
+    let [refocused, moved] = [rows(true), rows(false)].map(|rows| rows[10..].to_vec());
+    let ([cx, cy], longer) = ([2, 3].map(|k| made.truth.camera.parameters[k]), 4e-3);
+    for &k in &refocused {
+        for o in &mut made.observations[k].observations {
+            o.uv = [o.uv[0] + longer * (o.uv[0] - cx), o.uv[1] + longer * (o.uv[1] - cy)];
+        }
+    }
+    let bumped = Pose::from_xyz_rpy([1e-3, 0.0, 0.0], [0.0; 3]);
+    moved.iter().for_each(|&k| change(&mut made, k..k + 1, |pose| bumped * pose));
+    let mut series = halves(&made, |_, _| ());
+    (series[1].camera, series[1].mounting) = ("other".into(), "other".into());
+    let solution = solved(&series);
+    let focus =
+        solution.findings.iter().filter_map(|f| if let Finding::FocusChange(own) = f { Some(own) } else { None });
+    let cameras: Vec<&str> = focus.map(|own| own.camera.as_str()).collect();
+    assert_eq!(cameras, [series[0].camera.as_str()], "{:?}", solution.findings);
+    let [found] = &displaced(&solution)[..] else { panic!("{:?}", solution.findings) };
+    assert_eq!((found.body, found.mounting.as_str()), (Carried::CameraInHand, "other"), "{found:?}");
+    assert_eq!(found.images[0], made.stops.stops[moved[0]].image, "{found:?}");
+}

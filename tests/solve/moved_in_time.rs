@@ -3,7 +3,7 @@
 
 use nalgebra::Vector6;
 use robotcal::Code;
-use robotcal::diagnose::{Carried, Displaced, Displacement, Finding};
+use robotcal::diagnose::{Carried, Displaced, Displacement, Finding, Quantity};
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::model::camera::Lens;
@@ -244,19 +244,22 @@ fn few_stops_of_a_robot_of_many_parameters_are_not_accused() {
 }
 
 /// A series is refused, or its result fails a gate, with this code and these names of joints and images.
-fn assert_named(series: &MeasuredSeries, code: Code, names: &[&str]) {
+/// Its numbers.
+fn assert_named(series: &MeasuredSeries, code: Code, names: &[&str]) -> Vec<Quantity> {
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
-    let said = match identify(chain(), std::slice::from_ref(series), &options) {
+    let (said, quantities) = match identify(chain(), std::slice::from_ref(series), &options) {
         Err(refusal) => {
             assert_eq!(refusal.code, code, "{refusal}");
-            refusal.to_string()
+            (refusal.to_string(), refusal.quantities)
         }
         Ok(solution) => {
             let found = solution.findings.iter().find(|f| f.code() == code && f.fails());
-            found.map_or_else(|| panic!("{:?}", solution.findings), |f| format!("{:?}: {}", f.subjects(), f.seen()))
+            let found = found.unwrap_or_else(|| panic!("{:?}", solution.findings));
+            (format!("{:?}: {}", found.subjects(), found.seen()), found.quantities())
         }
     };
     names.iter().for_each(|name| assert!(said.contains(name), "{name}: {said}"));
+    quantities
 }
 
 /// Something large happens after half of the images, after which no start fits most of them, or after three quarters, after which the others are
@@ -302,11 +305,8 @@ fn images_that_are_turned_are_no_moved_camera() {
             image.observations.iter_mut().for_each(|o| o.uv = [2.0 * cx - o.uv[0], 2.0 * cy - o.uv[1]]);
         }
         let series = measured(&turned, &chain());
-        assert_named(&series, Code::ImagesTurned, &[series.stops[from].image.as_str()]);
-        let options = Options { model: RobotModel::Rigid, ..Options::default() };
-        if let Err(said) = identify(chain(), &[series], &options) {
-            let turn = said.quantities.iter().find(|q| q.name == "turn").unwrap().value;
-            assert!((turn - std::f64::consts::PI).abs() < 1e-9, "{said}");
-        }
+        let told = assert_named(&series, Code::ImagesTurned, &[series.stops[from].image.as_str()]);
+        let turn = told.iter().find(|q| q.name == "turn").unwrap().value;
+        assert!((turn - std::f64::consts::PI).abs() < 1e-9, "{told:?}");
     }
 }
