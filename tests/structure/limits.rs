@@ -133,7 +133,6 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/staged.rs VARIED", "step of a derivative"),
     ("identify/start.rs COMPARED", "how many starts are compared"),
     ("identify/suspects.rs ENOUGH", "samples of a median"),
-    ("identify/suspects.rs UNITS", "units of length"),
     ("identify/touch_mistakes.rs FITTED", "starts of a search"),
     ("identify/touch_mistakes.rs NAMED", "how many are named"),
     ("identify/turns.rs MOST_MISFIT", "robust loss of a choice"),
