@@ -150,13 +150,12 @@ fn a_picture_that_promises_gigabytes_is_refused_by_its_header() {
 }
 
 #[test]
-fn a_pipe_a_device_and_a_folder_are_refused_at_once() {
+fn a_pipe_a_device_and_a_folder_are_refused_unread() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap().success());
     std::os::unix::fs::symlink("/dev/zero", at("zero")).unwrap();
     fs::create_dir(at("folder")).unwrap();
-    let start = Instant::now();
     for name in ["pipe", "zero", "folder"] {
         let path = at(name);
         let errors = [
@@ -172,7 +171,6 @@ fn a_pipe_a_device_and_a_folder_are_refused_at_once() {
     let image = at("run.mcap");
     std::os::unix::fs::symlink("/dev/zero", &image).unwrap();
     assert_eq!(read(&image).unwrap_err().exit_code(), 2);
-    assert!(start.elapsed() < Duration::from_secs(20));
     assert_small();
 }
 
@@ -196,8 +194,9 @@ fn deeply_nested_elements_are_refused_before_they_are_followed() {
 /// A chain of ten thousand links and a comb of as many: before, the time grew with the square and the cube of their number.
 #[test]
 fn ten_thousand_links_are_read_in_linear_time() {
+    const PARTS: usize = 4;
     let n = 10_000;
-    for comb in [false, true] {
+    let read = |n: usize, comb: bool| {
         let links: String = (0..n).map(|k| format!("<link name='l{k}'/>\n")).collect();
         let joint = |k: usize| {
             let parent = if comb && k.is_multiple_of(2) { k.saturating_sub(2) } else { k - 1 };
@@ -213,8 +212,13 @@ fn ten_thousand_links_are_read_in_linear_time() {
         assert_eq!(robot.chain(Some("l0"), Some("l2")).unwrap().tip, "l2");
         // Too many joints for an arm, or too many tips to choose from.
         assert_eq!(robot.chain(None, None).unwrap_err().exit_code(), 2);
-        let took = start.elapsed();
-        assert!(took < Duration::from_secs(20), "{took:?}");
+        start.elapsed()
+    };
+    for comb in [false, true] {
+        // As many links in parts take as long, and a quarter of the time of the whole where that grows with the square.
+        let parts: Duration = (0..PARTS).map(|_| read(n / PARTS, comb)).sum();
+        let whole = read(n, comb);
+        assert!(whole < 3 * parts, "{whole:?} {parts:?}");
     }
     assert_small();
 }
