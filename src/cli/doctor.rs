@@ -75,7 +75,7 @@ pub(super) fn run(args: &DoctorArgs) -> Result<Verdict> {
 
 /// All files of a folder that are needed and not there; a recording is read as a whole.
 fn files_of(folder: &Path, seen: &mut Examination) {
-    if folder.is_file() || folder.join("metadata.yaml").is_file() {
+    if folder.is_file() || series::is_recording(folder) {
         return;
     }
     if !folder.is_dir() {

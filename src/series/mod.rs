@@ -45,7 +45,9 @@ pub use controller_poses::{ControllerPoses, ReadOtherwise};
 pub use inputs::InputFile;
 pub use joints::{Covariates, DEFAULT_PLACEMENT, SeriesStop, StopKey, Stops};
 pub use manifest::{AngleUnit, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder};
-pub use mcap::{CameraInfo, Clock, Delay, Extracted, Motion, Picking, RecordingOptions, StopReport, extract};
+pub use mcap::{
+    CameraInfo, Clock, Delay, Extracted, Motion, Picking, RecordingOptions, StopReport, extract, is_recording,
+};
 #[cfg(feature = "mcap")]
 pub use mcap::{FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, require_new, write_recording};
 pub use named_poses::{NamedPoses, read_named_poses};

@@ -12,7 +12,7 @@ use super::image_file;
 use super::inputs::InputFile;
 use super::joints::{SeriesStop, StopKey, Stops};
 use super::manifest::{AngleUnit, Manifest};
-use super::mcap::require_recording;
+use super::mcap::{is_recording, require_recording, written_in};
 use super::observation::ImageObservations;
 use super::observation_file;
 use super::plate::Plate;
@@ -126,8 +126,14 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     let name = folder_name(folder)?;
     let manifest_path = folder.join("series.toml");
     if !manifest_path.exists() {
-        let remedy =
-            format!("give the folder that holds it; `robotcal doctor {}` says what a series needs", folder.display());
+        let recording = written_in(folder).into_iter().next().filter(|_| !folder.join("images").exists());
+        let remedy = match recording {
+            Some(recording) => format!("give the recording that it holds: {}", recording.display()),
+            None => format!(
+                "give the folder that holds it; `robotcal doctor {}` says what a series needs",
+                folder.display()
+            ),
+        };
         return Err(Error::new(Code::SeriesMissing, folder.display(), "holds no series.toml", remedy));
     }
     let mut inputs = Vec::new();
@@ -538,14 +544,6 @@ impl Series {
     }
 }
 
-/// Whether a path is a recording: an `.mcap` file, another bag that will be refused with advice, or a rosbag2 folder.
-fn is_recording(path: &Path) -> bool {
-    if path.is_dir() {
-        return !path.join("series.toml").exists() && path.join("metadata.yaml").exists();
-    }
-    path.extension().is_some_and(|e| ["mcap", "bag", "db3", "zstd"].iter().any(|known| e == *known))
-}
-
 /// The manifest of a recording that is given by itself: `<its name>.toml` or `series.toml` beside it.
 pub(super) fn manifest_beside(recording: &Path) -> Result<PathBuf> {
     let candidates = [recording.with_extension("toml"), recording.with_file_name("series.toml")];
@@ -556,8 +554,14 @@ pub(super) fn manifest_beside(recording: &Path) -> Result<PathBuf> {
             candidates[0].display(),
             candidates[1].display()
         );
-        let remedy =
-            "write one: format = 1, camera_mount = \"hand\", plate = \"plate.toml\", and base and tip if needed";
+        let within = written_in(recording).into_iter().find(|part| part.with_extension("toml").is_file());
+        let remedy = match within {
+            Some(part) => format!("give the recording in it that has one: {}", part.display()),
+            None => {
+                "write one: format = 1, camera_mount = \"hand\", plate = \"plate.toml\", and base and tip if needed"
+                    .to_owned()
+            }
+        };
         Error::new(Code::SeriesMissing, recording.display(), what, remedy)
     })
 }

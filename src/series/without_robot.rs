@@ -6,6 +6,7 @@ use super::camera_section::CameraMount;
 use super::controller_file;
 use super::joints::{DEFAULT_PLACEMENT, SeriesStop, Stops};
 use super::manifest::Manifest;
+use super::mcap::is_recording;
 use super::observation_file;
 use super::plate_file::read_plate;
 use super::read::{Series, Source, file_name, folder_name, image_files, optional_images, plate_of, read};
@@ -20,7 +21,7 @@ use crate::error::{Code, Error, Result};
 pub fn read_without_robot(folder: &Path) -> Result<Series> {
     let manifest_path = folder.join("series.toml");
     let is_series = ["joints.csv", controller_file::NAME].iter().any(|name| folder.join(name).is_file());
-    if !folder.is_dir() || is_series || folder.join("metadata.yaml").is_file() {
+    if !folder.is_dir() || is_series || is_recording(folder) {
         return read(folder);
     }
     let name = folder_name(folder)?;

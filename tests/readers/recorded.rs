@@ -9,7 +9,8 @@ use robotcal::Code;
 use robotcal::geom::Pose;
 use robotcal::series::{
     AngleUnit, CameraInfo, Edge, FramePoses, ImageMarks, ImageObservations, MarkKind, MarkLayer, Observation,
-    RecordingContent, RecordingOptions, Series, Source, convert_recording, extract, read, write_recording,
+    RecordingContent, RecordingOptions, Series, Source, convert_recording, extract, is_recording, read,
+    read_without_robot, write_recording,
 };
 use robotcal::urdf::{Chain, RobotDescription};
 use tempfile::TempDir;
@@ -135,6 +136,31 @@ fn a_recording_without_a_manifest_says_what_to_write() {
     let error = read(&converted).unwrap_err();
     assert_says(&error, Code::SettingMissing, &["camera_mount"]);
     assert_says(&read(&recording("old.bag")).unwrap_err(), Code::RecordingFormat, &["rosbags-convert"]);
+}
+
+/// A recorder that crashes writes no metadata.yaml.
+#[test]
+fn a_folder_of_one_recording_is_a_recording_without_metadata_too() {
+    let folder = recorded("bag.toml", MANIFEST);
+    let bag = folder.path().join("bag");
+    fs::create_dir(&bag).unwrap();
+    fs::rename(folder.path().join("run.mcap"), bag.join("bag_0.mcap")).unwrap();
+    for series in [read(&bag).unwrap(), read_without_robot(&bag).unwrap()] {
+        assert!(matches!(&series.source, Source::Recording(path) if *path == bag), "{:?}", series.source);
+    }
+    assert_eq!(with_stops(&bag, &folder.path().join("pictures")).stops.stops.len(), 5);
+    // Recordings of several names are several.
+    fs::copy(bag.join("bag_0.mcap"), bag.join("run2.mcap")).unwrap();
+    assert!(!is_recording(&bag));
+    assert_says(&read(&bag).unwrap_err(), Code::SeriesMissing, &["bag_0.mcap"]);
+    fs::remove_file(bag.join("run2.mcap")).unwrap();
+    // What holds a series beside a recording stays a series.
+    for name in ["series.toml", "joints.csv", "images"] {
+        assert!(is_recording(&bag));
+        fs::write(bag.join(name), "").unwrap();
+        assert!(!is_recording(&bag), "{name}");
+        fs::remove_file(bag.join(name)).unwrap();
+    }
 }
 
 #[test]

@@ -189,6 +189,26 @@ fn doctor_names_all_that_is_missing_at_once() {
 }
 
 #[test]
+fn doctor_takes_a_folder_of_a_recording_without_metadata_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("bag");
+    std::fs::create_dir(&bag).unwrap();
+    std::fs::copy(root("tests/recordings/lz4.mcap"), bag.join("bag_0.mcap")).unwrap();
+    let unstated = robotcal(&["doctor", bag.to_str().unwrap()]);
+    assert_eq!(unstated.status.code(), Some(2));
+    assert_says(&text(&unstated), Code::SeriesMissing, &["bag.toml"]);
+    std::fs::write(folder.path().join("bag.toml"), "format = 1\ncamera_mount = \"hand\"\nplate = \"plate.toml\"\n")
+        .unwrap();
+    std::fs::write(
+        folder.path().join("plate.toml"),
+        "format = 1\nkind = \"chessboard\"\ncolumns = 3\nrows = 2\npitch_m = 0.02\ntolerance_m = 0.0001\n",
+    )
+    .unwrap();
+    let stated = robotcal(&["doctor", bag.to_str().unwrap()]);
+    assert_eq!(stated.status.code(), Some(0), "{}", text(&stated));
+}
+
+#[test]
 fn doctor_says_that_a_bag_of_ros_1_must_be_converted() {
     let folder = tempfile::tempdir().unwrap();
     let bag = folder.path().join("run1.bag");

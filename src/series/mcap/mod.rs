@@ -35,5 +35,7 @@ pub use extract::{Extracted, extract};
 pub(super) use file::require_recording;
 pub use messages::CameraInfo;
 pub use options::{Clock, Motion, Picking, RecordingOptions};
+pub use parts::is_recording;
+pub(super) use parts::written_in;
 #[cfg(feature = "mcap")]
 pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, require_new, write_recording};

@@ -12,6 +12,38 @@ use crate::files::{self, FileKind};
 const KNOWN: [&str; 2] = [".mcap", ".db3"];
 /// How a file ends that rosbag2 has compressed as a whole.
 const PACKED: &str = ".zstd";
+/// How single files end that are recordings, some of which are refused with advice.
+const SINGLE: [&str; 4] = ["mcap", "bag", "db3", "zstd"];
+/// What a series folder holds: a recording that lies there, too, does not make it one.
+const OF_SERIES: [&str; 5] = ["series.toml", "joints.csv", "controller.csv", "observations.csv", "images"];
+
+/// Whether a path is a recording: an `.mcap` file, another bag that will be refused with advice, or a rosbag2 folder. One without metadata.yaml,
+/// as a recorder leaves it that crashed, holds the files of one recording.
+pub fn is_recording(path: &Path) -> bool {
+    if !path.is_dir() {
+        return path.extension().is_some_and(|e| SINGLE.iter().any(|known| e == *known));
+    }
+    let has = |name: &&str| path.join(name).exists();
+    if path.join("metadata.yaml").exists() {
+        return !path.join("series.toml").exists();
+    }
+    let mut names: Vec<String> = written_in(path).iter().map(|part| name_without_number(part)).collect();
+    names.dedup();
+    names.len() == 1 && !OF_SERIES.iter().any(has)
+}
+
+/// Files of recordings in a folder, packed ones as well, in the order of their names.
+pub(in crate::series) fn written_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_part = |path: &PathBuf| {
+        let name = path.to_string_lossy();
+        let name = name.strip_suffix(PACKED).unwrap_or(&name);
+        path.is_file() && KNOWN.iter().any(|end| name.ends_with(end))
+    };
+    let mut parts: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(is_part).collect();
+    parts.sort();
+    parts
+}
 
 /// The files of a recording, in the order in which they were written.
 pub(super) struct Parts {
@@ -115,9 +147,22 @@ fn by_name(all: &[PathBuf]) -> Vec<PathBuf> {
 
 /// rosbag2 numbers the files of a long recording: `name_0.mcap`, ..., `name_10.mcap`.
 fn split_number(path: &Path) -> (Option<u64>, PathBuf) {
-    let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = stem(path);
     let number = stem.rsplit_once('_').and_then(|(_, n)| n.parse().ok());
     (number, path.to_path_buf())
+}
+
+/// The name of the recording that a file is a part of.
+fn name_without_number(path: &Path) -> String {
+    let stem = if ends(path, PACKED) { stem(&path.with_extension("")) } else { stem(path) };
+    match stem.rsplit_once('_') {
+        Some((name, number)) if number.parse::<u64>().is_ok() => name.to_owned(),
+        _ => stem,
+    }
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 /// A part that is packed holds stops, which must not be lost in silence.
