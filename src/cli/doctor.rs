@@ -158,8 +158,6 @@ fn images(series: &Series, seen: &mut Examination) {
     for size in sizes {
         match size {
             Ok(size) => known.push(size),
-            // Such a name ends `identify`, too.
-            Err(e) if e.code == Code::FileNotRegular => seen.missing(e),
             Err(e) => seen.note(&Notice::new(e.code, e.place, format!("{}; the image is left out", e.what), e.remedy)),
         }
     }

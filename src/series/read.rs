@@ -25,6 +25,7 @@ use super::table::Table;
 use super::units;
 use super::views::{CameraView, Seen, has_mixed_mounts};
 use crate::error::{Code, Error, Notice, Result, plain_name};
+use crate::files::{self, FileKind};
 use crate::urdf::Chain;
 
 const IMAGE_EXTENSIONS: [&str; 9] = ["png", "tif", "tiff", "pgm", "pnm", "ppm", "jpg", "jpeg", "bmp"];
@@ -527,7 +528,7 @@ impl Series {
         self.folder.join(self.manifest.mcap.as_deref().unwrap_or(written))
     }
 
-    /// Hashes of all image files (stops in order, then dark and white).
+    /// Hashes of all image files (stops in order, then dark and white). What cannot be opened has none: no image is seen there.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -540,7 +541,8 @@ impl Series {
         if let Source::Images { dark, white, .. } = &self.source {
             files.extend(dark.iter().chain(white).map(PathBuf::as_path));
         }
-        files.into_par_iter().map(InputFile::of_file).collect()
+        let can_be_opened = |file: &&Path| files::open(file, FileKind::Image).is_ok();
+        files.into_par_iter().filter(can_be_opened).map(InputFile::of_file).collect()
     }
 }
 

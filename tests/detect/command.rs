@@ -111,6 +111,29 @@ fn images_that_show_nothing_or_a_mirrored_plate_are_named_and_the_others_kept() 
     assert!(out.join("overlay/img_005.png").is_file());
 }
 
+/// A link to nothing and a folder among the images cost no other image.
+#[test]
+fn what_is_no_file_among_the_images_is_left_out_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let images = ["img_000.png", "img_001.png", "img_002.png", "img_023.png"];
+    let run1 = small_series(folder.path(), &images);
+    for image in &images[..2] {
+        std::fs::remove_file(run1.join("images").join(image)).unwrap();
+    }
+    std::os::unix::fs::symlink("nowhere.png", run1.join("images").join(images[0])).unwrap();
+    std::fs::create_dir(run1.join("images").join(images[1])).unwrap();
+    let out = folder.path().join("seen");
+    let output = robotcal(&["detect", "--series", name(&run1), "--overlay", "--out", name(&out)]);
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output));
+    let Source::Observations(observed) = read(&out).unwrap().source else { panic!("no observations") };
+    assert_eq!(observed.iter().map(|i| i.image.as_str()).collect::<Vec<_>>(), images[2..]);
+    let doctor = robotcal(&["doctor", name(&run1)]);
+    assert_eq!(doctor.status.code(), Some(0), "{}", text(&doctor));
+    for image in &images[..2] {
+        assert!(text(&doctor).contains(image), "{}", text(&doctor));
+    }
+}
+
 #[test]
 fn single_images_need_a_plate_and_no_series() {
     let folder = tempfile::tempdir().unwrap();
