@@ -37,7 +37,7 @@ impl CellFiles {
         if let Some(other) = series.iter().find(|s| s.manifest.robot_2 != first.manifest.robot_2) {
             return Err(Error::new(
                 Code::SeriesDisagree,
-                other.folder.join("series.toml").display(),
+                other.manifest_file().display(),
                 format!("its [robot_2] is not that of {}", first.name),
                 "identify series with and without a second arm one by one",
             ));

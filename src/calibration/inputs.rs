@@ -202,7 +202,7 @@ fn carriers(all: &[Series]) -> Result<[Option<&str>; 2]> {
         None => Ok(links),
         Some(other) => Err(Error::new(
             Code::SeriesDisagree,
-            other.folder.join("series.toml").display(),
+            other.manifest_file().display(),
             format!("its camera and plate hang on other links than those of {}", first.name),
             "identify series with different links ([plate_mount] or link of the camera) one by one",
         )),
@@ -225,7 +225,7 @@ fn agreed<'a>(
         None => Ok(Some(link)),
         Some((second, other)) => Err(Error::new(
             Code::SeriesDisagree,
-            second.folder.join("series.toml").display(),
+            second.manifest_file().display(),
             format!("{what} = \"{other}\", while {} has {what} = \"{link}\"", first.name),
             format!("series of one robot share base and tip: correct one, or give --{what}"),
         )),

@@ -119,7 +119,9 @@ fn files_of(folder: &Path, seen: &mut Examination) {
 }
 
 fn examine(series: &Series, args: &DoctorArgs, seen: &mut Examination) {
-    seen.good("series.toml", &format!("plate of {} markers", series.plate.markers.len()));
+    let manifest = series.manifest_file();
+    let manifest = manifest.file_name().map_or_else(|| "series.toml".into(), |name| name.to_string_lossy());
+    seen.good(&manifest, &format!("plate of {} markers", series.plate.markers.len()));
     match &series.source {
         Source::Recording(path) => {
             seen.good("recording", &format!("{}; stops are taken out by identify", path.display()))

@@ -235,7 +235,7 @@ fn same_links(s: &Series, record: &SolutionRecord) -> Result<()> {
             let remedy = format!(
                 "the frames go with the robot of the solution: write {key} = \"{of_solution}\" or leave it out, or identify to this {key}"
             );
-            return Err(Error::new(Code::SolutionDiffers, s.folder.join("series.toml").display(), what, remedy));
+            return Err(Error::new(Code::SolutionDiffers, s.manifest_file().display(), what, remedy));
         }
     }
     Ok(())

@@ -226,7 +226,7 @@ impl Kind for Mistake {
                 format!("bring the column {joint} of joints.csv to the unit of the others")
             }
             MistakeKind::Unit { joint: None, are_degrees } => {
-                format!("write joint_unit = \"{}\" in series.toml", unit(*are_degrees)[2])
+                format!("write joint_unit = \"{}\" in series.toml (of a recording: in the .toml of its name)", unit(*are_degrees)[2])
             }
             MistakeKind::SlideUnit { joint, metres, .. } => {
                 format!("multiply the column {joint} of joints.csv by {metres}: prismatic joints are metres")
@@ -249,7 +249,7 @@ impl Kind for Mistake {
             ),
             MistakeKind::Mount(mount) => {
                 let word = if *mount == CameraMount::Hand { "hand" } else { "fixed" };
-                format!("write camera_mount = \"{word}\" in series.toml")
+                format!("write camera_mount = \"{word}\" in series.toml (of a recording: in the .toml of its name)")
             }
             MistakeKind::Mirrored => {
                 "mirror the images back, or have camera and converter write them as the sensor sees (no mirroring, no exchange of rows and columns); if they are right, negate the joints that turn the arm to its sides, as A1, A4 and A6 of an arm with six joints".into()

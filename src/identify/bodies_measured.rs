@@ -87,7 +87,7 @@ pub(super) fn seen_lengths(series: &Series, several: bool, bodies: &[SeenBody]) 
             let what =
                 format!("[[distance]] names '{}', and nothing of this name was measured", given.between[unknown]);
             let remedy = "name two contacts of contacts.csv, two targets of points.csv or poses.csv, or two markers of the plate";
-            return Err(Error::new(Code::CsvName, series.folder.join("series.toml").display(), what, remedy));
+            return Err(Error::new(Code::CsvName, series.manifest_file().display(), what, remedy));
         }
         lengths.push(SeenLength { between, distance_m: given.distance_m, sigma_m: given.sigma_m });
     }

@@ -146,7 +146,7 @@ impl Arm {
         stated_deg: &[f64],
     ) -> Result<Vec<f64>> {
         let chain = &self.robot.chain;
-        let place = format!("{}: [controller] first_stop_deg", series.folder.join("series.toml").display());
+        let place = format!("{}: [controller] first_stop_deg", series.manifest_file().display());
         if stated_deg.len() != chain.readings.len() {
             let what =
                 format!("has {} values, and the robot the joints {}", stated_deg.len(), chain.readings.join(", "));

@@ -131,7 +131,7 @@ pub(super) fn no_images(series: &Series) -> Error {
 pub(super) fn several_cameras(series: &Series) -> Error {
     let what = "has several cameras, and one is looked at at a time";
     let remedy = "give the images of one camera with --plate";
-    Error::new(Code::SettingUnsupported, series.folder.join("series.toml").display(), what, remedy)
+    Error::new(Code::SettingUnsupported, series.manifest_file().display(), what, remedy)
 }
 
 /// Why an image cannot be used.

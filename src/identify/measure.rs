@@ -86,7 +86,7 @@ pub fn measure(
     let (width_px, height_px) = found_size.or(camera.size_px()).ok_or_else(|| {
         Error::new(
             Code::SettingMissing,
-            series.folder.join("series.toml").display(),
+            series.manifest_file().display(),
             "the size of the images is not known: there are observations and no images",
             "state width_px and height_px under [camera]",
         )
@@ -159,7 +159,7 @@ fn unused_repeatability(series: &Series) -> Option<Notice> {
     let stated = series.manifest.robot.repeatability_m?;
     Some(Notice::new(
         Code::RepeatabilityUnused,
-        "series.toml",
+        series.manifest_file().display(),
         format!("robot.repeatability_m = {stated} is not used: the joint noise is estimated from the images"),
         "give --joint-noise where it is known",
     ))

@@ -342,7 +342,7 @@ fn check_rotations(of: &str, poses: &[PosePair], limits: &Limits) -> Result<()> 
             seen.to_degrees(),
             largest.to_degrees()
         );
-        let remedy = "write joint_unit = \"rad\" in series.toml; in controller.csv convert the angles, or state the rotation in radians";
+        let remedy = "write joint_unit = \"rad\" in series.toml (of a recording: in the .toml of its name); in controller.csv convert the angles, or state the rotation in radians";
         return Err(Error::new(Code::JointUnitWrong, of, what, remedy));
     }
     Err(Error::new(

@@ -56,7 +56,7 @@ pub(super) fn lens_of(series: &Series) -> Result<Lens> {
     Lens::from_name(name).ok_or_else(|| {
         Error::new(
             Code::LensUnknown,
-            series.folder.join("series.toml").display(),
+            series.manifest_file().display(),
             format!("[camera] model = \"{name}\" is not a lens model of this program"),
             format!("use one of: {}", Lens::names().join(", ")),
         )

@@ -511,7 +511,8 @@ impl Series {
             let remedy = "give a series with joints.csv";
             return Err(Error::new(Code::ReadingsMissing, self.readings_file().display(), what, remedy));
         }
-        units::readings_for(&self.readings_file(), &self.stops, self.joint_unit(), chain)
+        let stating = |unit: &str| format!("write joint_unit = \"{unit}\" in {}", self.manifest_file().display());
+        units::readings_for(&self.readings_file(), &self.stops, self.joint_unit(), chain, stating)
     }
 
     /// What the readings of a chain give reason to say: columns that are not used, values beyond the URDF's limits.
@@ -526,6 +527,13 @@ impl Series {
     pub fn readings_file(&self) -> PathBuf {
         let written = if self.controller.is_some() { controller_file::NAME } else { "joints.csv" };
         self.folder.join(self.manifest.mcap.as_deref().unwrap_or(written))
+    }
+
+    /// The file that says what is said of the series, for messages: that of a recording has a name of its own.
+    pub fn manifest_file(&self) -> PathBuf {
+        let usual = self.folder.join("series.toml");
+        let own = self.manifest.mcap.as_ref().map(|recording| self.folder.join(recording).with_extension("toml"));
+        own.filter(|own| self.inputs.iter().any(|input| input.path == *own)).unwrap_or(usual)
     }
 
     /// Hashes of all image files (stops in order, then dark and white). What cannot be opened has none: no image is seen there.

@@ -20,9 +20,10 @@ impl Series {
         let Source::Recording(recording) = &self.source else { return Ok(self) };
         let extracted = extract(recording, images, options)?;
         let (dark, white) = optional_images(&self.folder)?;
+        let written = self.manifest_file();
         self.source = Source::Images { folder: images.to_path_buf(), dark, white };
         self.notices.extend(extracted.notices);
-        self.notices.extend(settle_unit(&mut self.manifest, &extracted.stops, &self.folder));
+        self.notices.extend(settle_unit(&mut self.manifest, &extracted.stops, &self.folder, &written));
         self.inputs.extend(extracted.inputs);
         fill_camera(&mut self.manifest, extracted.camera_info.as_ref());
         self.stops = extracted.stops;
@@ -31,7 +32,7 @@ impl Series {
 }
 
 /// Joint states are in rad: what stands beside a recording may be of the series that it was made of, in degrees.
-fn settle_unit(manifest: &mut Manifest, stops: &Stops, recording: &Path) -> Option<Notice> {
+fn settle_unit(manifest: &mut Manifest, stops: &Stops, recording: &Path, written: &Path) -> Option<Notice> {
     let stated = *manifest.joint_unit.get_or_insert(AngleUnit::Rad);
     let mut all = stops.stops.iter().filter_map(|stop| stop.raw_readings.as_ref()).flatten();
     if stated == AngleUnit::Rad || !all.all(|q| q.abs() < SMALL_DEG) {
@@ -39,7 +40,7 @@ fn settle_unit(manifest: &mut Manifest, stops: &Stops, recording: &Path) -> Opti
     }
     manifest.joint_unit = Some(AngleUnit::Rad);
     let what = "joint_unit is deg, but its joint states are all within a turn in radians, in which ROS has them, and are taken so";
-    let remedy = "write joint_unit = \"rad\" in the series.toml beside it";
+    let remedy = format!("write joint_unit = \"rad\" in {}", written.display());
     Some(Notice::new(Code::RadiansAsDegrees, recording.display(), what, remedy))
 }
 
@@ -105,8 +106,10 @@ fn write_folder(recording: &Path, unfinished: &Path, folder: &Path, options: &Re
 /// Text of the manifest for the folder, with its plate copied. Where there is none beside the recording, it does not say where
 /// the camera is: nobody knows, and a guess would look like knowledge.
 fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extracted) -> Result<String> {
-    let mut known = true;
-    let mut manifest = match manifest_beside(recording) {
+    let beside = manifest_beside(recording);
+    let written = beside.clone().unwrap_or_else(|_| unfinished.join("series.toml"));
+    let known = beside.is_ok();
+    let mut manifest = match beside {
         Ok(path) => {
             let mut manifest = Manifest::read(&path, &mut extracted.inputs)?;
             if let Some(plate) = &manifest.plate {
@@ -115,7 +118,6 @@ fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extract
             manifest
         }
         Err(_) => {
-            known = false;
             let what = "nothing beside it says where the camera is and which plate was seen";
             let remedy = "add camera_mount = \"hand\" or \"fixed\" to series.toml and put plate.toml into the folder";
             extracted.notices.push(Notice::new(Code::RecordingManifest, recording.display(), what, remedy));
@@ -123,7 +125,7 @@ fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extract
         }
     };
     manifest.mcap = None;
-    extracted.notices.extend(settle_unit(&mut manifest, &extracted.stops, recording));
+    extracted.notices.extend(settle_unit(&mut manifest, &extracted.stops, recording, &written));
     fill_camera(&mut manifest, extracted.camera_info.as_ref());
     let text = manifest.to_toml()?;
     let stays = |line: &&str| known || !line.starts_with("camera_mount");

@@ -37,7 +37,8 @@ pub struct LengthUnit {
     pub metres: f64,
 }
 
-/// Readings of every stop in the order of `Chain::readings`, rad and m; `None` for images taken off the robot.
+/// Readings of every stop in the order of `Chain::readings`, rad and m; `None` for images taken off the robot. `stating` says how another unit
+/// is stated.
 ///
 /// # Errors
 /// A joint of the chain that has no column, and a unit that cannot be true.
@@ -46,6 +47,7 @@ pub(super) fn readings_for(
     stops: &Stops,
     unit: AngleUnit,
     chain: &Chain,
+    stating: impl Fn(&str) -> String,
 ) -> Result<Vec<Option<Vec<f64>>>> {
     let columns = columns_of(file, stops, chain)?;
     let raw: Vec<Option<Vec<f64>>> = stops
@@ -54,7 +56,7 @@ pub(super) fn readings_for(
         .map(|stop| stop.raw_readings.as_ref().map(|r| columns.iter().map(|&c| r[c]).collect()))
         .collect();
     let known: Vec<&[f64]> = raw.iter().flatten().map(Vec::as_slice).collect();
-    check_unit(file, unit, chain, &known, |unit| format!("write joint_unit = \"{unit}\" in series.toml"))?;
+    check_unit(file, unit, chain, &known, stating)?;
     Ok(raw.into_iter().map(|row| row.map(|q| to_si(chain, unit, &q))).collect())
 }
 

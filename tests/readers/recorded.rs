@@ -138,6 +138,28 @@ fn a_recording_without_a_manifest_says_what_to_write() {
     assert_says(&read(&recording("old.bag")).unwrap_err(), Code::RecordingFormat, &["rosbags-convert"]);
 }
 
+/// The manifest of a recording has the name of the recording.
+#[test]
+fn the_manifest_that_was_read_is_named() {
+    let own = recorded("run.toml", MANIFEST);
+    let path = own.path().join("run.mcap");
+    assert_eq!(read(&path).unwrap().manifest_file(), own.path().join("run.toml"));
+    assert_eq!(with_stops(&path, &own.path().join("pictures")).manifest_file(), own.path().join("run.toml"));
+    let usual = recorded("series.toml", &format!("{MANIFEST}mcap = \"run.mcap\"\n"));
+    for path in [usual.path(), &usual.path().join("run.mcap")] {
+        assert_eq!(read(path).unwrap().manifest_file(), usual.path().join("series.toml"));
+    }
+    let mut degrees = with_stops(&path, &own.path().join("again"));
+    for reading in degrees.stops.stops.iter_mut().filter_map(|stop| stop.raw_readings.as_mut()) {
+        reading.iter_mut().for_each(|q| *q = 100.0);
+    }
+    assert_says(
+        &degrees.readings_for(&chain()).unwrap_err(),
+        Code::DegreesAsRadians,
+        &["joint_unit = \"deg\"", "run.toml"],
+    );
+}
+
 /// A recorder that crashes writes no metadata.yaml.
 #[test]
 fn a_folder_of_one_recording_is_a_recording_without_metadata_too() {
