@@ -51,12 +51,17 @@ impl BoardSeen {
         Some([self.along(0)?, self.along(1)?])
     }
 
+    /// Whether it has the size of a board, with all ends in view.
+    pub fn is(&self, board: BoardSize) -> bool {
+        let [columns, rows] = [board.columns, board.rows].map(i32::unsigned_abs);
+        self.size().is_some_and(|size| size == [columns, rows] || size == [rows, columns])
+    }
+
     /// Why it is not the board of the plate file; `None` where it may be.
     pub fn contradiction(&self, board: BoardSize) -> Option<Error> {
         let stated = [board.columns, board.rows].map(i32::unsigned_abs);
-        let is_stated = |[a, b]: [u32; 2]| [a, b] == stated || [b, a] == stated;
         match (self.size(), self.along(0).or(self.along(1))) {
-            (Some(size), _) if is_stated(size) => None,
+            _ if self.is(board) => None,
             (Some(size), _) => Some(other_size(Counted::InnerCorners, size, stated)),
             (None, Some(one)) if !stated.contains(&one) => Some(end_to_end(Counted::InnerCorners, one, stated)),
             _ => None,

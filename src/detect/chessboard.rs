@@ -5,7 +5,7 @@
 
 use std::cell::LazyCell;
 
-use calib_targets_chessboard::{ChessboardDetector, ChessboardParams};
+use calib_targets_chessboard::{ChessboardCorner, ChessboardDetection, ChessboardDetector, ChessboardParams};
 
 use super::board_ends::Ends;
 use super::board_labels::{BoardSize, Labelling, Lattice, Placement, label};
@@ -13,6 +13,7 @@ use super::board_seen::BoardSeen;
 use super::bytes::Bytes;
 use super::corner_finder::find_corners;
 use super::corners::{Window, measure};
+use super::sizes::on_picture;
 use super::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;
@@ -37,6 +38,26 @@ const LARGE_PX: usize = 500_000;
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
     let lattice = find_lattice(picture, board).ok_or_else(no_board)?;
+    let largest = on_lattice(picture, lattice, board);
+    match &largest {
+        Ok(detection) if detection.failure.is_none() => largest,
+        _ => beside(picture, board).map_or(largest, Ok),
+    }
+}
+
+/// The stated board from end to end beside a larger one.
+fn beside(picture: &Picture, board: BoardSize) -> Option<Detection> {
+    let bytes = Bytes::of(picture);
+    let scales = scales(picture).into_iter();
+    let mut lattices = scales.flat_map(|scale| lattices(&bytes, scale).into_iter().skip(1));
+    lattices.find_map(|lattice| {
+        BoardSeen::of(picture, &lattice).filter(|seen| seen.is(board))?;
+        let found = on_lattice(picture, lattice, board).ok()?;
+        (found.failure.is_none() && found.outline == Outline::Whole).then_some(found)
+    })
+}
+
+fn on_lattice(picture: &Picture, lattice: Lattice, board: BoardSize) -> Result<Detection> {
     let ends = LazyCell::new(|| Ends::of(picture, &lattice));
     let placed = |labelling: Labelling| Some((labelling, labelling.placement()?));
     let by_ends = || placed(ends.as_ref()?.place(board)?);
@@ -90,14 +111,11 @@ pub(super) fn board_size(plate: &Plate) -> Result<BoardSize> {
 /// squares may be too small for the finder.
 fn find_lattice(picture: &Picture, board: BoardSize) -> Option<Lattice> {
     let bytes = Bytes::of(picture);
-    let scales = if picture.width * picture.height > LARGE_PX { [0.5, 1.0] } else { [1.0, 2.0] };
     let mut best: Option<Lattice> = None;
-    for scale in scales {
-        // Pixels are counted from their centres.
-        let on_picture = |c: f64| (c + 0.5) / scale - 0.5;
-        let Some(lattice) = lattice(&bytes.scaled(scale)) else { continue };
+    for scale in scales(picture) {
+        let Some(lattice) = lattices(&bytes, scale).into_iter().next() else { continue };
         if best.as_ref().is_none_or(|other| lattice.len() >= other.len()) {
-            best = Some(lattice.into_iter().map(|(key, uv)| (key, uv.map(on_picture))).collect());
+            best = Some(lattice);
         }
         if best.as_ref().is_some_and(|found| found.len() >= (board.columns * board.rows) as usize) {
             break;
@@ -106,11 +124,17 @@ fn find_lattice(picture: &Picture, board: BoardSize) -> Option<Lattice> {
     best
 }
 
-/// The corners of a regular lattice.
-fn lattice(bytes: &Bytes) -> Option<Lattice> {
-    let found = ChessboardDetector::new(ChessboardParams::default()).ok()?.detect(&find_corners(bytes))?;
-    let at = |x: f32, y: f32| [f64::from(x), f64::from(y)];
-    Some(found.corners.iter().map(|c| ((c.grid.u, c.grid.v), at(c.position.x, c.position.y))).collect())
+/// Sizes of the picture at which lattices are sought, one after the other.
+fn scales(picture: &Picture) -> [f64; 2] {
+    if picture.width * picture.height > LARGE_PX { [0.5, 1.0] } else { [1.0, 2.0] }
+}
+
+/// The regular lattices at another size of the picture, the largest first, in px of the picture.
+fn lattices(bytes: &Bytes, scale: f64) -> Vec<Lattice> {
+    let Ok(detector) = ChessboardDetector::new(ChessboardParams::default()) else { return Vec::new() };
+    let at = |c: &ChessboardCorner| [c.position.x, c.position.y].map(|px| on_picture(px, scale));
+    let lattice = |found: ChessboardDetection| found.corners.iter().map(|c| ((c.grid.u, c.grid.v), at(c))).collect();
+    detector.detect_all(&find_corners(&bytes.scaled(scale))).into_iter().map(lattice).collect()
 }
 
 fn no_board() -> Error {

@@ -4,8 +4,8 @@ use super::Detection;
 use crate::error::{Code, Error, Notice};
 use crate::series::{Plate, PlateKind};
 
-const CORRECT: &str =
-    "correct columns and rows of the plate file, or take images in which nothing covers an outer line; ";
+const CORRECT: &str = "correct columns and rows of the plate file, or take images in which nothing covers an outer line and no other board \
+                       is in view; ";
 
 /// What columns and rows count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -287,3 +287,31 @@ fn a_plate_file_of_another_board_is_named_with_its_remedy() {
         assert_says(&text(&output), Code::PlateNowhere, &["columns", "rows", names[0], names[1]]);
     }
 }
+
+/// Draws a plate of a kind; returns its folder.
+fn drawn(folder: &Path, board: &str, args: &[&str]) -> PathBuf {
+    let board = folder.join(board);
+    let output = robotcal(&[&["plate", "--out", name(&board), "--kind"], args].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    board
+}
+
+/// A larger board in view hides the stated one no more.
+#[test]
+fn the_stated_chessboard_is_found_beside_a_larger_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |shape: &str| drawn(folder.path(), shape, &["chessboard", "--shape", shape, "--pitch-mm", "20"]);
+    let (large, small) = (of("9x6"), of("5x4"));
+    let [left, right] = [&large, &small].map(|board| image::open(board.join("plate.png")).unwrap().to_luma8());
+    let (width, height) = (left.width() + right.width(), left.height().max(right.height()));
+    let mut both = image::GrayImage::from_pixel(width, height, image::Luma([255]));
+    image::imageops::replace(&mut both, &left, 0, 0);
+    image::imageops::replace(&mut both, &right, i64::from(left.width()), 0);
+    let picture = folder.path().join("both.png");
+    both.save(&picture).unwrap();
+    let count = |plate: &Path| {
+        let plate = robotcal::series::read_plate(&plate.join("plate.toml"), &mut Vec::new()).unwrap();
+        detect(&load(&picture, None).unwrap(), &plate).unwrap().observations.len()
+    };
+    assert_eq!((count(&large), count(&small)), (54, 20));
+}
