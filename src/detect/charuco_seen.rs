@@ -71,9 +71,17 @@ fn stated(plate: &Plate) -> Option<Dictionary> {
 /// The board that most markers agree with, where it is another one.
 pub(super) fn instead(picture: &Picture, plate: &Plate) -> Option<Seen> {
     let passes: Vec<Vec<Quad>> = passes(picture).collect();
-    let all =
-        stated(plate).into_iter().chain(usual_dictionaries()).map(|dictionary| Seen::of(picture, &passes, dictionary));
+    agreed(picture, &passes, stated(plate).into_iter().chain(usual_dictionaries())).filter(|best| !best.is(plate))
+}
+
+/// The board that most markers agree with, of these dictionaries.
+pub(super) fn agreed(
+    picture: &Picture,
+    passes: &[Vec<Quad>],
+    dictionaries: impl Iterator<Item = Dictionary>,
+) -> Option<Seen> {
+    let all = dictionaries.map(|dictionary| Seen::of(picture, passes, dictionary));
     // The first of equals.
     let best = all.reduce(|best, other| if other.pairs > best.pairs { other } else { best })?;
-    (best.pairs >= LEAST_PAIRS && !best.is(plate)).then_some(best)
+    (best.pairs >= LEAST_PAIRS).then_some(best)
 }

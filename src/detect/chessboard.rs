@@ -109,7 +109,7 @@ pub(super) fn board_size(plate: &Plate) -> Result<BoardSize> {
 /// The largest regular lattice of saddle points: sought in the picture at one size, and at the next unless that shows as many corners
 /// as the board has. Large pictures begin with half their size, where there are fewer pixels and a sharpened edge is one step; in small ones
 /// squares may be too small for the finder.
-fn find_lattice(picture: &Picture, board: BoardSize) -> Option<Lattice> {
+pub(super) fn find_lattice(picture: &Picture, board: BoardSize) -> Option<Lattice> {
     let bytes = Bytes::of(picture);
     let mut best: Option<Lattice> = None;
     for scale in scales(picture) {

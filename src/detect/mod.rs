@@ -21,6 +21,7 @@ mod flat_field_facts;
 mod jpeg;
 mod load;
 mod misfit;
+mod other_kind;
 mod picture;
 pub mod puzzleboard;
 mod quads;

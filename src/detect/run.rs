@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::dot_sizes::told_by_others;
 use super::size_seen::{line_missing, nowhere_whole};
-use super::{Detection, Outline, Picture, examine, tags};
+use super::{Detection, Outline, Picture, examine, other_kind, tags};
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{batches, is_turned_by_viewers, picture_size};
 use crate::series::{Plate, PlateKind};
@@ -105,7 +105,34 @@ pub fn detect_series(
     note_unseen_tags(images, plate, &mut found);
     refuse_odd_sizes(images, &mut found);
     refuse_odd_dots(images, &mut found);
+    if !found.iter().any(shows) {
+        name_other_kinds(images, plate, &picture, &mut found);
+    }
     found
+}
+
+/// Where no image shows the plate, one of another kind may be in view.
+fn name_other_kinds(
+    images: &[PathBuf],
+    plate: &Plate,
+    picture: impl Fn(&Path) -> Result<Picture> + Sync,
+    found: &mut [SeriesImage],
+) {
+    let failure = |image: &SeriesImage| image.detection.failure.clone().filter(|_| image.size.is_some());
+    let failures: BTreeMap<&Path, Error> =
+        images.iter().zip(&*found).filter_map(|(path, image)| Some((path.as_path(), failure(image)?))).collect();
+    let paths: Vec<&Path> = failures.keys().copied().collect();
+    let looked = in_batches(&paths, |path| {
+        let seen = picture(path).ok().zip(failures.get(path));
+        let named = seen.and_then(|(seen, why)| other_kind::named(&seen, plate, why));
+        named.map_or_else(SeriesImage::default, SeriesImage::failed)
+    });
+    let looked: BTreeMap<&Path, SeriesImage> = paths.into_iter().zip(looked).collect();
+    for (path, image) in images.iter().zip(found) {
+        if let Some(named) = looked.get(path.as_path()).and_then(|looked| looked.detection.failure.clone()) {
+            image.detection.failure = Some(named);
+        }
+    }
 }
 
 /// Looks at images, as many at a time as memory holds; in their order.

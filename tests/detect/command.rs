@@ -296,6 +296,39 @@ fn drawn(folder: &Path, board: &str, args: &[&str]) -> PathBuf {
     board
 }
 
+/// The commonest mix-up: the plate file of another kind of plate.
+#[test]
+fn a_plate_of_another_kind_is_named_by_what_is_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let chessboard = drawn(folder.path(), "chessboard", &["chessboard", "--shape", "9x6", "--pitch-mm", "20"]);
+    let print = ["--tag-mm", "22", "--dictionary", "DICT_5X5_1000"];
+    let charuco =
+        drawn(folder.path(), "charuco", &[&["charuco", "--shape", "7x5", "--pitch-mm", "30"], &print[..]].concat());
+    let tags =
+        drawn(folder.path(), "aruco-grid", &[&["aruco-grid", "--shape", "6x4", "--gap-mm", "6"], &print[..]].concat());
+    let written = |file: &str, lines: &str| {
+        let path = folder.path().join(file);
+        std::fs::write(&path, format!("format = 1\npitch_m = 0.03\ntolerance_m = 0.0001\n{lines}")).unwrap();
+        path
+    };
+    let dots = written("dots.toml", "kind = \"circle-grid\"\ncolumns = 9\nrows = 6\nradius_m = 0.005\n");
+    let squares = written("squares.toml", "kind = \"chessboard\"\ncolumns = 7\nrows = 5\n");
+    let circles = root().join("datasets/kr6_small/plate.toml");
+    for (picture, plate, names) in [
+        (&chessboard, &circles, ["\"chessboard\"", "9 x 6"]),
+        (&chessboard, &dots, ["\"chessboard\"", "9 x 6"]),
+        (&charuco, &squares, ["\"charuco\"", "DICT_5X5_1000"]),
+        (&tags, &squares, ["\"aruco-grid\"", "24"]),
+        (&tags, &circles, ["\"aruco-grid\"", "24"]),
+    ] {
+        let picture = picture.join("plate.png");
+        let out = folder.path().join("seen");
+        let output = robotcal(&["detect", name(&picture), "--plate", name(plate), "--out", name(&out)]);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert_says(&text(&output), Code::PlateNowhere, &names);
+    }
+}
+
 /// A larger board in view hides the stated one no more.
 #[test]
 fn the_stated_chessboard_is_found_beside_a_larger_one() {
