@@ -129,10 +129,10 @@ pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &Bo
 
 /// The plate that the flags describe, by way of the text of its plate.toml.
 fn plate(args: &BoardArgs, size: &BoardSize) -> Result<Plate> {
-    let has_ids = matches!(args.kind, Kind::Aprilgrid | Kind::ArucoGrid | Kind::Tag);
+    let has_ids = matches!(args.kind, Kind::Charuco | Kind::Aprilgrid | Kind::ArucoGrid | Kind::Tag);
     if args.id != 0 && !has_ids {
         let what = format!("is not of --kind {}", kind_name(args.kind));
-        let remedy = "leave it out; an aprilgrid, an aruco-grid and a tag have ids that may begin elsewhere than at 0";
+        let remedy = "leave it out; a charuco board, an aprilgrid, an aruco-grid and a tag have ids that may begin elsewhere than at 0";
         return Err(Error::new(Code::OptionConflict, "--id", what, remedy));
     }
     let mut text =
@@ -166,7 +166,7 @@ fn plate(args: &BoardArgs, size: &BoardSize) -> Result<Plate> {
         }
         Kind::Charuco => {
             key("pitch_m", pitch());
-            key("aruco", format!("{{ dictionary = {}, side_m = {} }}", dictionary(), tag()));
+            key("aruco", format!("{{ dictionary = {}, side_m = {}, first_id = {} }}", dictionary(), tag(), args.id));
         }
         Kind::Puzzleboard => {
             let [column, row] = args.origin.unwrap_or_default();

@@ -6,7 +6,7 @@
 use super::board_labels::{BoardSize, Lattice, Placement};
 use super::bytes::Bytes;
 use super::charuco_markers::{Marker, Print, decode, prints};
-use super::charuco_seen::{Seen, instead};
+use super::charuco_seen::{Seen, ids, instead};
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
 use super::corners::{Window, measure};
@@ -198,6 +198,11 @@ fn other_board(plate: &Plate, seen: &Seen) -> Error {
             differs
                 .push(format!("they stand as on a board with {columns} inner corners in a row, not {}", plate.columns));
         }
+        if let Some(id) = seen.middle_id.filter(|_| seen.ids_differ(plate)) {
+            let stated = ids(plate);
+            let last = stated.end.saturating_sub(1);
+            differs.push(format!("their numbers are about {id}, and those of the board {} to {last}", stated.start));
+        }
         if let Some(side) = seen.side.filter(|_| seen.side_differs(plate)) {
             differs.push(format!("their side is {side:.2} squares"));
         }
@@ -208,7 +213,7 @@ fn other_board(plate: &Plate, seen: &Seen) -> Error {
         }
         false => {
             "correct the plate file: columns and rows count inner corners (one less than squares), columns from left to right; dictionary \
-             (this one, or a shorter one of its kind) and side_m stand under [aruco]"
+             (this one, or a shorter one of its kind), side_m and first_id (the number of the first marker) stand under [aruco]"
         }
     };
     Error::new(Code::PlateNotFound, "image", format!("{}: {}", not_found(plate), differs.join(", ")), remedy)

@@ -25,6 +25,8 @@ pub(super) struct Print {
     pub ratio: f64,
     /// OpenCV's layout before 4.6 on a board with an even number of rows: first square light, with marker 0.
     pub legacy: bool,
+    /// Number of its first marker.
+    pub first_id: u32,
 }
 
 /// What is seen of a board of one print.
@@ -51,11 +53,9 @@ pub(super) fn decode(
     board: BoardSize,
 ) -> Result<Option<Decoded>> {
     let [rows, columns] = [board.rows + 1, board.columns + 1].map(i32::unsigned_abs);
-    let ([rows, columns], dictionary) = match print.legacy {
-        false => ([rows, columns], print.dictionary),
-        // With too few codes no board is possible either way.
-        true => ([columns, rows], turned(print.dictionary, [columns, rows]).unwrap_or(print.dictionary)),
-    };
+    // A legacy board is one of the present layout after a quarter turn. With too few codes no board is possible either way.
+    let dictionary = arranged(print, [columns, rows]).unwrap_or(print.dictionary);
+    let [rows, columns] = if print.legacy { [columns, rows] } else { [rows, columns] };
     let spec = CharucoBoardSpec::new(rows, columns, 1.0, print.ratio as f32, dictionary);
     let mut params = CharucoParams::for_board(spec);
     params.chess = corner_config();
@@ -82,31 +82,42 @@ pub(super) fn decode(
     }))
 }
 
-/// Dictionaries of [`turned`]: the library wants their codes to live for ever, so each is made once.
-static TURNED: Mutex<BTreeMap<(&'static str, [u32; 2]), Dictionary>> = Mutex::new(BTreeMap::new());
+/// What a dictionary is arranged for: its name, columns and rows of squares, the layout, the first marker.
+type Arrangement = (&'static str, [u32; 2], bool, u32);
 
-/// The dictionary with which a legacy board of so many columns and rows of squares (the rows even) is one of the present layout: after a
-/// quarter turn to the right its first square is dark. The codes stand in the order of that layout, turned with the board, and those that are
-/// not on it follow; `None` where there are too few.
-fn turned(dictionary: Dictionary, [columns, rows]: [u32; 2]) -> Option<Dictionary> {
-    let mut made = TURNED.lock().unwrap_or_else(PoisonError::into_inner);
-    let key = (dictionary.name(), [columns, rows]);
+/// Dictionaries of [`arranged`]: the library wants their codes to live for ever, so each is made once.
+static ARRANGED: Mutex<BTreeMap<Arrangement, Dictionary>> = Mutex::new(BTreeMap::new());
+
+/// The dictionary with which a board of so many columns and rows of squares is one of the present layout whose first marker is 0: the codes stand in
+/// the order of that board, and those that are not on it follow. After a quarter turn to the right the first square of a legacy board (its rows
+/// even) is dark, and its codes are turned with it. `None` where there are too few.
+fn arranged(print: &Print, [columns, rows]: [u32; 2]) -> Option<Dictionary> {
+    let Print { dictionary, legacy, first_id, .. } = *print;
+    if !legacy && first_id == 0 {
+        return Some(dictionary);
+    }
+    let mut made = ARRANGED.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = (dictionary.name(), [columns, rows], legacy, first_id);
     if let Some(known) = made.get(&key) {
         return Some(*known);
     }
-    let squares = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
-    let light = squares.filter(|(row, column)| (row + column) % 2 == 0);
-    let mut places: Vec<(u32, u32, usize)> =
-        light.zip(0..).map(|((row, column), id)| (column, rows - 1 - row, id)).collect();
-    places.sort_unstable();
-    let codes = dictionary.codes();
-    let on_board: Option<Vec<u64>> =
-        places.iter().map(|(_, _, id)| Some(rotate_code_u64(*codes.get(*id)?, dictionary.marker_size(), 1))).collect();
-    let codes = [&on_board?, codes.get(places.len()..)?].concat().leak();
+    let all = dictionary.codes();
+    let (before, from) = all.split_at_checked(usize::try_from(first_id).ok()?)?;
+    let mut codes = [from, before].concat();
+    if legacy {
+        let squares = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+        let light = squares.filter(|(row, column)| (row + column) % 2 == 0);
+        let mut places: Vec<(u32, u32, usize)> =
+            light.zip(0..).map(|((row, column), id)| (column, rows - 1 - row, id)).collect();
+        places.sort_unstable();
+        let turn = |code: &u64| rotate_code_u64(*code, dictionary.marker_size(), 1);
+        let on_board: Option<Vec<u64>> = places.iter().map(|(_, _, id)| codes.get(*id).map(turn)).collect();
+        codes = [&on_board?, codes.get(places.len()..)?].concat();
+    }
     let (size, bits) = (dictionary.marker_size(), dictionary.max_correction_bits());
-    let turned = Dictionary::from_static_codes(dictionary.name(), size, bits, codes).ok()?;
-    made.insert(key, turned);
-    Some(turned)
+    let arranged = Dictionary::from_static_codes(dictionary.name(), size, bits, codes.leak()).ok()?;
+    made.insert(key, arranged);
+    Some(arranged)
 }
 
 /// The first layouts of a plate's markers: with an odd number of rows of squares both are the same.
@@ -120,16 +131,27 @@ fn layouts(plate: &Plate, legacy: bool) -> impl Iterator<Item = bool> + Clone + 
 pub(super) fn prints(plate: &Plate) -> Result<Vec<Print>> {
     let Some(aruco) = &plate.aruco else { return Ok(usual_prints(plate)) };
     let dictionary = dictionary_named(&aruco.dictionary, "plate")?;
-    let ratio = aruco.side_m / plate.pitch_m;
-    Ok(layouts(plate, aruco.legacy).map(|legacy| Print { dictionary, ratio, legacy }).collect())
+    let needed = u64::from(aruco.first_id) + u64::from(needed(plate));
+    if needed > dictionary.codes().len() as u64 {
+        let what = format!("{} has {} markers, but {needed} are needed", dictionary.name(), dictionary.codes().len());
+        let remedy = "correct dictionary and first_id of the plate file, or columns and rows";
+        return Err(Error::new(Code::PlateNotDetectable, "plate", what, remedy));
+    }
+    let (ratio, first_id) = (aruco.side_m / plate.pitch_m, aruco.first_id);
+    Ok(layouts(plate, aruco.legacy).map(|legacy| Print { dictionary, ratio, legacy, first_id }).collect())
 }
 
 /// All that OpenCV prints with enough markers for the plate, in the usual sizes.
 fn usual_prints(plate: &Plate) -> Vec<Print> {
-    let needed = (plate.columns + 1) * (plate.rows + 1) / 2;
-    let able = usual_dictionaries().filter(|d| d.codes().len() >= needed as usize);
+    let able = usual_dictionaries().filter(|d| d.codes().len() >= needed(plate) as usize);
     let sizes = able.flat_map(|dictionary| USUAL_RATIOS.map(|ratio| (dictionary, ratio)));
+    let print = |dictionary, ratio, legacy| Print { dictionary, ratio, legacy, first_id: 0 };
     sizes
-        .flat_map(|(dictionary, ratio)| layouts(plate, false).map(move |legacy| Print { dictionary, ratio, legacy }))
+        .flat_map(|(dictionary, ratio)| layouts(plate, false).map(move |legacy| print(dictionary, ratio, legacy)))
         .collect()
+}
+
+/// Markers of a plate.
+pub(super) fn needed(plate: &Plate) -> u32 {
+    (plate.columns + 1) * (plate.rows + 1) / 2
 }

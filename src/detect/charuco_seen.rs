@@ -1,8 +1,11 @@
 //! Which ChArUco board is in a picture that does not show the one of the plate file.
 
+use std::ops::Range;
+
 use calib_targets_aruco::Dictionary;
 
 use super::Picture;
+use super::charuco_markers::needed;
 use super::quads::Quad;
 use super::tag_code::Reader;
 use super::tag_layout::Layout;
@@ -24,6 +27,8 @@ pub(super) struct Seen {
     pub side: Option<f64>,
     /// Markers in all places, as on an ArUco grid.
     pub side_by_side: bool,
+    /// The number in the middle of those of the markers.
+    pub middle_id: Option<u32>,
     pairs: usize,
 }
 
@@ -41,6 +46,7 @@ impl Seen {
             columns,
             side: layout.length(2).map(|two| 2.0 / two),
             side_by_side,
+            middle_id: layout.middle_id(),
             pairs,
         }
     }
@@ -48,7 +54,13 @@ impl Seen {
     /// Whether this is the board of the plate file, as far as it says.
     fn is(&self, plate: &Plate) -> bool {
         let columns = self.columns.is_none_or(|n| n == plate.columns);
-        !self.dictionary_differs(plate) && columns && !self.side_differs(plate) && !self.side_by_side
+        let is_print = !self.dictionary_differs(plate) && !self.side_differs(plate) && !self.side_by_side;
+        is_print && columns && !self.ids_differ(plate)
+    }
+
+    /// Whether most numbers are none of the board.
+    pub fn ids_differ(&self, plate: &Plate) -> bool {
+        self.middle_id.is_some_and(|id| !ids(plate).contains(&id))
     }
 
     /// Whether the plate file states another dictionary, or none.
@@ -61,6 +73,12 @@ impl Seen {
         let stated = plate.aruco.as_ref().map(|aruco| aruco.side_m / plate.pitch_m);
         self.side.zip(stated).is_some_and(|(seen, stated)| (seen - stated).abs() > ALIKE)
     }
+}
+
+/// Numbers of the markers of the plate file.
+pub(super) fn ids(plate: &Plate) -> Range<u32> {
+    let first = plate.aruco.as_ref().map_or(0, |aruco| aruco.first_id);
+    first..first.saturating_add(needed(plate))
 }
 
 /// The dictionary of the plate file.

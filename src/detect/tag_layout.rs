@@ -52,6 +52,11 @@ impl Layout {
         Self { places: best, corners }
     }
 
+    /// The number in the middle of those of the tags.
+    pub fn middle_id(&self) -> Option<u32> {
+        self.places.keys().nth(self.places.len() / 2).copied()
+    }
+
     /// By how much the number of a tag changes with so many steps, as most pairs say.
     pub fn change(&self, steps: Steps) -> Option<i64> {
         self.agreed(steps).map(|(change, _)| change)

@@ -51,6 +51,13 @@ pub struct Aruco {
     /// marker 0. With an odd number both layouts are the same.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub legacy: bool,
+    /// Number of the first marker in the dictionary: boards that share one begin elsewhere.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub first_id: u32,
+}
+
+fn is_zero(number: &u32) -> bool {
+    *number == 0
 }
 
 /// A plate of markers as designed (or as corrected by an earlier calibration).

@@ -261,27 +261,34 @@ fn aruco(path: &Path, file: &PlateFile, pitch_m: f64) -> Result<Option<Aruco>> {
     let conflict =
         |what: &str| Err(Error::new(Code::SettingConflict, path.display(), what, "remove them, or correct `kind`"));
     let of_tags = [file.tag_m, file.spacing, file.gap_m].iter().any(Option::is_some) || file.family.is_some();
-    if of_tags || file.first_id.is_some() || file.id.is_some() {
-        return conflict("tag_m, spacing, gap_m, family, first_id and id are only for plates of tags");
+    if of_tags || file.id.is_some() {
+        return conflict("tag_m, spacing, gap_m, family and id are only for plates of tags");
     }
-    let own = file.marker_m.is_some() || file.dictionary.is_some() || file.legacy.is_some();
+    let own = file.marker_m.is_some() || file.dictionary.is_some() || file.legacy.is_some() || file.first_id.is_some();
     if !file.kind.print().has_tags {
         return match own || file.aruco.is_some() {
-            true => conflict("marker_m, dictionary, legacy and [aruco] are only for plates with markers in them"),
+            true => {
+                conflict("marker_m, dictionary, legacy, first_id and [aruco] are only for plates with markers in them")
+            }
             false => Ok(None),
         };
     }
     let aruco = match (&file.aruco, file.marker_m, &file.dictionary) {
         (None, None, None) if !own => return Ok(None),
         (Some(aruco), ..) if !own => aruco.clone(),
-        (None, Some(side_m), Some(dictionary)) => {
-            Aruco { dictionary: dictionary.clone(), side_m, legacy: file.legacy.unwrap_or(false) }
-        }
+        (None, Some(side_m), Some(dictionary)) => Aruco {
+            dictionary: dictionary.clone(),
+            side_m,
+            legacy: file.legacy.unwrap_or(false),
+            first_id: file.first_id.unwrap_or(0),
+        },
         (None, ..) => {
             let what = "marker_m and dictionary state the markers of a charuco board together";
             return Err(Error::new(Code::SettingMissing, path.display(), what, "add what is missing, or remove all"));
         }
-        (Some(_), ..) => return conflict("marker_m, dictionary and legacy stand beside [aruco], which says the same"),
+        (Some(_), ..) => {
+            return conflict("marker_m, dictionary, legacy and first_id stand beside [aruco], which says the same");
+        }
     };
     if !(aruco.side_m > 0.0 && aruco.side_m < pitch_m) {
         let what = format!("a marker of {} m does not fit into a square of {pitch_m} m", aruco.side_m);

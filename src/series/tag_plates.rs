@@ -46,7 +46,7 @@ pub fn regions(plate: &Plate) -> Result<Vec<Region>> {
                 print: TagPrint::Opencv,
                 side_m: aruco.side_m,
                 gap_m: 0.0,
-                first_id: 0,
+                first_id: aruco.first_id,
             };
             charuco(plate, &tags, aruco.legacy)
         }
@@ -60,7 +60,7 @@ fn charuco(plate: &Plate, tags: &Tags, legacy: bool) -> Result<Vec<Region>> {
     let (columns, rows) = (plate.columns + 1, plate.rows + 1);
     let dictionary = tags.dictionary("plate.toml", columns * rows / 2)?;
     let first_dark = u32::from(legacy && rows.is_multiple_of(2));
-    let mut next = 0;
+    let mut next = tags.first_id;
     let mut all = Vec::new();
     for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
         let at = |k: u32, n: u32| (f64::from(k) - (f64::from(n) - 1.0) / 2.0) * plate.pitch_m;

@@ -16,7 +16,12 @@ const COLUMNS: u32 = 8;
 const ROWS: u32 = 5;
 
 fn charuco_plate(aruco: Option<(&str, f64)>) -> Plate {
-    let aruco = aruco.map(|(name, ratio)| Aruco { dictionary: name.to_owned(), side_m: ratio * 0.01, legacy: false });
+    let aruco = aruco.map(|(name, ratio)| Aruco {
+        dictionary: name.to_owned(),
+        side_m: ratio * 0.01,
+        legacy: false,
+        first_id: 0,
+    });
     Plate { aruco, ..Plate::lattice(PlateKind::Charuco, COLUMNS, ROWS, 0.01, 1e-4) }
 }
 
@@ -82,7 +87,7 @@ fn a_board_of_the_layout_before_opencv_4_6_keeps_its_ids() {
         let new = Scene::new(columns, ROWS, view.unwrap_or(whole));
         let print = |legacy: bool| Print::Charuco { dictionary: DICT_4X4_50, ratio: 0.7, legacy };
         let pictures = [false, true].map(|legacy| Scene { print: print(legacy), ..new.clone() }.render(0));
-        let aruco = |legacy| Some(Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy });
+        let aruco = |legacy| Some(Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy, first_id: 0 });
         let plate = |aruco| Plate { aruco, ..Plate::lattice(PlateKind::Charuco, columns, ROWS, 0.01, 1e-4) };
         for legacy in [false, true] {
             let detection = detect(&pictures[usize::from(legacy)], &plate(aruco(legacy))).unwrap();
@@ -118,7 +123,7 @@ fn a_board_that_uses_up_its_dictionary_is_found_in_either_layout() {
     ] {
         let view = View::new(columns, rows, [321.3, 239.6], square, 0.05, [0.005, -0.003]);
         let plate = |legacy| Plate {
-            aruco: Some(Aruco { dictionary: dictionary.name().to_owned(), side_m: 0.007, legacy }),
+            aruco: Some(Aruco { dictionary: dictionary.name().to_owned(), side_m: 0.007, legacy, first_id: 0 }),
             ..Plate::lattice(PlateKind::Charuco, columns, rows, 0.01, 1e-4)
         };
         for legacy in [false, true] {
@@ -152,7 +157,8 @@ fn no_image_keeps_ids_of_a_layout_that_another_image_contradicts() {
     for legacy in [false, true] {
         let pictures = [of(whole, legacy), of(part, legacy)].map(|scene| scene.render(0));
         let seen = |aruco: Option<bool>| {
-            let aruco = aruco.map(|legacy| Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy });
+            let aruco =
+                aruco.map(|legacy| Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy, first_id: 0 });
             let plate = Plate { aruco, ..charuco_plate(None) };
             let picture = |path: &Path| Ok(pictures[usize::from(path == paths[1])].clone());
             detect_series(&paths, &plate, picture, |_| {}).into_iter().map(|image| image.detection).collect::<Vec<_>>()

@@ -329,6 +329,23 @@ fn a_plate_of_another_kind_is_named_by_what_is_seen() {
     }
 }
 
+/// Several boards share a dictionary: the first marker of one of them is not 0.
+#[test]
+fn a_charuco_board_may_begin_at_any_marker() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["charuco", "--shape", "7x5", "--pitch-mm", "30", "--tag-mm", "22", "--dictionary", "DICT_5X5_1000"];
+    let board = drawn(folder.path(), "board", &[&args[..], &["--id", "500"]].concat());
+    let stated = std::fs::read_to_string(board.join("plate.toml")).unwrap();
+    assert!(stated.contains("first_id = 500"), "{stated}");
+    let other = board.join("other.toml");
+    std::fs::write(&other, stated.replace("first_id = 500", "first_id = 0")).unwrap();
+    let picture = load(&board.join("plate.png"), None).unwrap();
+    let seen = |plate: &Path| detect(&picture, &robotcal::series::read_plate(plate, &mut Vec::new()).unwrap());
+    assert_eq!(seen(&board.join("plate.toml")).unwrap().observations.len(), 35);
+    let error = seen(&other).unwrap_err();
+    assert_says(&error, Code::PlateNotFound, &["0 to 23", "first_id"]);
+}
+
 /// A larger board in view hides the stated one no more.
 #[test]
 fn the_stated_chessboard_is_found_beside_a_larger_one() {
