@@ -11,7 +11,7 @@ use super::say::say_line;
 use crate::assess::Limits;
 use crate::calibration::{Ends, Inputs};
 use crate::error::{Code, Error, Notice, Result};
-use crate::files::picture_size;
+use crate::files::{is_whole, picture_size};
 use crate::identify::readings_of;
 use crate::series::{self, Series, Source};
 
@@ -155,11 +155,17 @@ fn examine(series: &Series, args: &DoctorArgs, seen: &mut Examination) {
 /// All pictures can be opened, and have one size.
 fn images(series: &Series, seen: &mut Examination) {
     let paths: Vec<&PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.as_ref()).collect();
-    let sizes: Vec<Result<(u32, u32)>> = paths.par_iter().map(|p| picture_size(p)).collect();
+    let sizes: Vec<Result<((u32, u32), bool)>> =
+        paths.par_iter().map(|p| Ok((picture_size(p)?, is_whole(p)?))).collect();
     let mut known: Vec<(u32, u32)> = Vec::new();
-    for size in sizes {
+    for (path, size) in paths.iter().zip(sizes) {
         match size {
-            Ok(size) => known.push(size),
+            Ok((size, true)) => known.push(size),
+            Ok((_, false)) => {
+                let what = "the file ends before its image does";
+                let remedy = "copy or record the image again";
+                seen.note(&Notice::new(Code::ImageTruncated, path.display(), what, remedy));
+            }
             Err(e) => seen.note(&Notice::new(e.code, e.place, format!("{}; the image is left out", e.what), e.remedy)),
         }
     }

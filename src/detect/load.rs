@@ -5,9 +5,9 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageError};
 
-use super::{Picture, jpeg};
+use super::Picture;
 use crate::error::{Code, Error, Result};
-use crate::files::{self, FileKind, MOST_SIDE_PX, decode_picture};
+use crate::files::{self, FileKind, MOST_SIDE_PX, decode_picture, jpeg};
 
 /// Weights of red, green and blue in the grey value (luma of ITU-R BT.709), applied to the stored counts.
 pub const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];

@@ -18,7 +18,6 @@ mod dot_sizes;
 mod edge_line;
 mod flat_field;
 mod flat_field_facts;
-mod jpeg;
 mod load;
 mod misfit;
 mod other_kind;

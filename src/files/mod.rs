@@ -1,12 +1,13 @@
 //! A user's files: regular files alone, none longer than its kind can be, pictures in bounded memory.
 
+pub mod jpeg;
 mod picture;
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-pub use picture::{MOST_SIDE_PX, batches, decode_picture, decoded_bytes, is_turned_by_viewers, picture_size};
+pub use picture::{MOST_SIDE_PX, batches, decode_picture, decoded_bytes, is_turned_by_viewers, is_whole, picture_size};
 
 use crate::error::{Code, Error, Result};
 

@@ -1,6 +1,6 @@
 //! Pictures of the formats that are read, in bounded memory.
 
-use std::io::{BufRead, BufReader, Seek};
+use std::io::{BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::Path;
 
@@ -8,8 +8,8 @@ use image::error::{ImageFormatHint, LimitError, LimitErrorKind, UnsupportedError
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits};
 
-use super::{FileKind, open};
-use crate::error::{Code, Result};
+use super::{FileKind, jpeg, open, read};
+use crate::error::{Code, Error, Result};
 
 /// Longest side that is accepted, px; the largest industrial sensors have about 20 000.
 pub const MOST_SIDE_PX: u32 = 32_768;
@@ -18,6 +18,11 @@ pub const MOST_SIDE_PX: u32 = 32_768;
 const MOST_BYTES: u64 = 910_000_000;
 
 const GREY_BYTES: u64 = 4;
+
+const PNG: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+const PNG_END: &[u8] = b"IEND";
+/// Bytes at the end of a file in which its mark of the end is sought first.
+const TAIL: u64 = 1 << 16;
 
 /// Formats that are read, whatever the name of the file says.
 const FORMATS: [ImageFormat; 5] =
@@ -75,7 +80,7 @@ pub fn picture_size(path: &Path) -> Result<(u32, u32)> {
     let (file, _) = open(path, FileKind::Image)?;
     let size = decoder(BufReader::new(file)).map(|d| d.dimensions());
     size.map_err(|e| {
-        crate::error::Error::new(
+        Error::new(
             Code::ImageUnreadable,
             path.display(),
             e,
@@ -88,6 +93,27 @@ pub fn picture_size(path: &Path) -> Result<(u32, u32)> {
 pub fn is_turned_by_viewers(path: &Path) -> bool {
     let decoder = open(path, FileKind::Image).ok().and_then(|(file, _)| decoder(BufReader::new(file)).ok());
     decoder.is_some_and(|mut d| d.orientation().is_ok_and(|o| o != Orientation::NoTransforms))
+}
+
+/// False for a PNG or JPEG file that ends before its image does. The end of the file tells, in most cases.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn is_whole(path: &Path) -> Result<bool> {
+    let io = |e: std::io::Error| Error::io(path, &e);
+    let (mut file, length) = open(path, FileKind::Image)?;
+    let (mut start, mut end) = (Vec::new(), Vec::new());
+    file.by_ref().take(PNG.len() as u64).read_to_end(&mut start).map_err(io)?;
+    file.seek(SeekFrom::Start(length.saturating_sub(TAIL))).map_err(io)?;
+    file.take(TAIL).read_to_end(&mut end).map_err(io)?;
+    let has = |bytes: &[u8], mark: &[u8]| bytes.windows(mark.len()).any(|window| window == mark);
+    if start == PNG {
+        return Ok(has(&end, PNG_END) || has(&read(path, FileKind::Image)?, PNG_END));
+    }
+    if !start.starts_with(&jpeg::START) || (length > TAIL && has(&end, &jpeg::END)) {
+        return Ok(true);
+    }
+    jpeg::is_complete(&mut Cursor::new(read(path, FileKind::Image)?)).map_err(io)
 }
 
 fn decoder<'a>(source: impl BufRead + Seek + 'a) -> ImageResult<impl ImageDecoder + 'a> {
@@ -135,6 +161,26 @@ mod tests {
         assert_eq!(turned.each_ref().map(|f| is_turned_by_viewers(f.path())), [false, false, true, true, true]);
         for file in &turned {
             assert_eq!(picture_size(file.path()).unwrap(), (3, 2));
+        }
+    }
+
+    /// What is behind the end of an image is no matter.
+    #[test]
+    fn half_a_picture_is_not_whole() {
+        let noise = image::GrayImage::from_fn(400, 300, |x, y| image::Luma([(x * x * 7 + y * 131 + x * y) as u8]));
+        for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Bmp] {
+            let mut bytes = Cursor::new(Vec::new());
+            noise.write_to(&mut bytes, format).unwrap();
+            let bytes = bytes.into_inner();
+            let file = tempfile::NamedTempFile::new().unwrap();
+            for (content, whole) in [
+                (bytes.clone(), true),
+                ([bytes.as_slice(), &[0; 200_000]].concat(), true),
+                (bytes[..bytes.len() / 2].to_vec(), format == ImageFormat::Bmp),
+            ] {
+                std::fs::write(file.path(), content).unwrap();
+                assert_eq!(is_whole(file.path()).unwrap(), whole, "{format:?}");
+            }
         }
     }
 }

@@ -127,10 +127,14 @@ fn what_is_no_file_among_the_images_is_left_out_alone() {
     assert_eq!(output.status.code(), Some(1), "{}", text(&output));
     let Source::Observations(observed) = read(&out).unwrap().source else { panic!("no observations") };
     assert_eq!(observed.iter().map(|i| i.image.as_str()).collect::<Vec<_>>(), images[2..]);
+    // And half a picture.
+    let half = run1.join("images").join(images[2]);
+    let bytes = std::fs::read(&half).unwrap();
+    std::fs::write(&half, &bytes[..bytes.len() / 2]).unwrap();
     let doctor = robotcal(&["doctor", name(&run1)]);
     assert_eq!(doctor.status.code(), Some(0), "{}", text(&doctor));
-    for image in &images[..2] {
-        assert!(text(&doctor).contains(image), "{}", text(&doctor));
+    for named in &images[..3] {
+        assert!(text(&doctor).contains(named), "{}", text(&doctor));
     }
 }
 

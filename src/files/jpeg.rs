@@ -2,13 +2,13 @@
 
 use std::io::{BufRead, Result, Seek};
 
-const START: [u8; 2] = [0xff, 0xd8];
+pub(super) const START: [u8; 2] = [0xff, 0xd8];
 const SCAN: u8 = 0xda;
-const END: [u8; 2] = [0xff, 0xd9];
+pub(super) const END: [u8; 2] = [0xff, 0xd9];
 
 /// False for a JPEG file without a mark of the end behind its first scan; what stands behind the mark does not count, nor do pictures in
 /// the segments before the scan.
-pub(super) fn is_complete(source: &mut (impl BufRead + Seek)) -> Result<bool> {
+pub fn is_complete(source: &mut (impl BufRead + Seek)) -> Result<bool> {
     source.rewind()?;
     let mut bytes = Vec::new();
     source.read_to_end(&mut bytes)?;
