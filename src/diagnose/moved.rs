@@ -17,7 +17,12 @@ pub struct BodyMoved {
     pub between: [String; 2],
     /// Images that saw it.
     pub images: Vec<String>,
+    /// Whether images that fit the others stand between them, again and again: nothing was moved once.
+    pub by_turns: bool,
 }
+
+/// Changes between the two places beyond that of a move, or of one to and fro with a wrong image or two in between.
+const TURNS: usize = 6;
 
 /// What the wrongly paired images of a series agree on, for each mounting and placement.
 pub(super) fn check(Adjustment { problem, state }: &Adjustment, setting: &CheckContext) -> Vec<BodyMoved> {
@@ -33,9 +38,28 @@ pub(super) fn check(Adjustment { problem, state }: &Adjustment, setting: &CheckC
     let moved = |([_, mounting, placement], wrong): ([usize; 3], Vec<(usize, SeenStop)>)| {
         let others = HandEye { camera: state.mountings[mounting], plate: state.placements[placement] };
         let (images, seen): (Vec<usize>, Vec<SeenStop>) = wrong.into_iter().unzip();
-        BodyMoved::of(problem, &images, agreement(&state.robot, &others, &seen, setting.limits)?)
+        let found = agreement(&state.robot, &others, &seen, setting.limits)?;
+        let members: Vec<usize> = found.members.iter().map(|&k| images[k]).collect();
+        let by_turns = stand_between(problem, &members);
+        Some(BodyMoved { by_turns, ..BodyMoved::of(problem, &images, found)? })
     };
     groups.into_iter().filter_map(moved).collect()
+}
+
+/// Whether images of the same mounting and placement that fit stand between the members, again and again.
+fn stand_between(problem: &Problem, members: &[usize]) -> bool {
+    let (Some(&from), Some(&to)) = (members.first(), members.last()) else { return false };
+    let group = |i: usize| {
+        let image = &problem.images[i];
+        [image.series, image.mounting, image.placement]
+    };
+    let own = (from..=to).filter(|&i| group(i) == group(from));
+    let is_member = own.filter_map(|i| {
+        let is_member = members.contains(&i);
+        (is_member || problem.images[i].rejected.is_none()).then_some(is_member)
+    });
+    let is_member: Vec<bool> = is_member.collect();
+    is_member.windows(2).filter(|two| two[0] != two[1]).count() >= TURNS
 }
 
 impl BodyMoved {
@@ -48,7 +72,7 @@ impl BodyMoved {
         let (early, late) = if neighbour > to { (to, neighbour) } else { (neighbour, from) };
         let name = |i: usize| problem.images[i].name.clone();
         let between = [name(early), name(late)];
-        Some(Self { moved: found.moved, between, images: images.into_iter().map(name).collect() })
+        Some(Self { moved: found.moved, between, images: images.into_iter().map(name).collect(), by_turns: false })
     }
 }
 
@@ -105,6 +129,13 @@ impl Kind for BodyMoved {
             self.images.last().map_or("", String::as_str),
         );
         match &self.moved {
+            Moved::Plate { distance_m, angle_rad } | Moved::Camera { distance_m, angle_rad } if self.by_turns => {
+                format!(
+                    "stands in two places by turns: {images}, agree on a place {:.1} mm and {:.1} mrad from that of the others, which stand between them",
+                    1e3 * distance_m,
+                    1e3 * angle_rad
+                )
+            }
             Moved::Plate { distance_m, angle_rad } | Moved::Camera { distance_m, angle_rad } => format!(
                 "was moved between {before} and {after}: {images}, agree on a place {:.1} mm and {:.1} mrad from that of the others",
                 1e3 * distance_m,
@@ -133,6 +164,10 @@ impl Kind for BodyMoved {
 
     fn remedy(&self) -> String {
         let remedy = match self.moved {
+            Moved::Plate { .. } if self.by_turns => {
+                "two equal boards may be in view (cover one of them), or the plate was put to and fro: give the rows of each place a placement of their own in joints.csv"
+            }
+            Moved::Camera { .. } if self.by_turns => "fasten the camera: it goes to and fro between two places",
             Moved::Plate { .. } => {
                 "give the rows after the move a placement of their own in joints.csv, and fix the plate better"
             }

@@ -294,6 +294,24 @@ fn what_breaks_a_series_is_named() {
     }
 }
 
+/// Two equal boards in view: every fourth image shows the other one, and nothing was moved.
+#[test]
+fn a_place_that_comes_and_goes_is_no_move() {
+    let pushed = Pose::exp(&Vector6::new(0.05, 0.02, 0.0, 0.0, 0.0, 0.3));
+    let told = |elsewhere: &dyn Fn(usize) -> bool| {
+        let mut series = seen(CameraMount::Hand, 36, 3);
+        (0..36).filter(|k| elsewhere(*k)).for_each(|k| change(&mut series, k..k + 1, |pose| pose * pushed));
+        let solution = solved(&series);
+        let moved = solution.findings.iter().find_map(|f| match f {
+            Finding::BodyMoved(moved) => Some((f.code(), moved.images.len(), moved.by_turns)),
+            _ => None,
+        });
+        moved.unwrap_or_else(|| panic!("{:?}", solution.findings))
+    };
+    assert_eq!(told(&|k| k % 4 == 1), (Code::PlateMoved, 9, true));
+    assert_eq!(told(&|k| k >= 27), (Code::PlateMoved, 9, false));
+}
+
 /// Pictures of the camera turned by half a turn about the point that its axis meets.
 #[test]
 fn images_that_are_turned_are_no_moved_camera() {

@@ -47,6 +47,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("diagnose/computed_postures.rs NAMED", "how many are named"),
     ("diagnose/tool_in_poses.rs NAMED", "how many are named"),
     ("diagnose/agreement.rs CANDIDATES", "how many are tried"),
+    ("diagnose/moved.rs TURNS", "which of two causes is told of what fails either way"),
     ("diagnose/exchanged_readings.rs MOST_STOPS", "how many are named"),
     ("diagnose/displaced.rs MOST_IMAGES", "how many are named"),
     ("diagnose/joint_noise.rs MOST_IMAGES", "how many are named"),
