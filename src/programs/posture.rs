@@ -147,7 +147,7 @@ fn unreached(posture: &str) -> Why {
 
 /// The codes and the way there must mean the same, where it is not known which of them counts.
 fn by_either(coded: Understood<Posture>, way: Understood<Posture>) -> Understood<Posture> {
-    let open = "its posture is not known: other routines switch the check of configurations off, and its confdata";
+    let open = "its posture is not known: the check of configurations may be switched off, and its confdata";
     let remedy = "(--nearest-posture heeds no confdata)";
     let unknown = |why: &str| Err(Why::new(LeftReason::PostureUnknown, format!("{open} {why} {remedy}")));
     match (coded, way) {

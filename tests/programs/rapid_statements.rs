@@ -292,3 +292,32 @@ fn moves_whose_path_something_else_corrects_are_left() {
         assert_eq!((told.corrected, found), (corrected, left), "{body}");
     }
 }
+
+/// Where an instruction fails, or a routine that it calls, the handler is entered with what held there.
+#[test]
+fn a_handler_of_rapid_begins_with_all_that_its_routine_has_passed_through() {
+    let cell = Cell::kuka(218);
+    let step = "MoveJ @,v1,z1,tGun\\WObj:=wTable;";
+    let shift = "PDispSet [[100,0,0],[1,0,0,0],[0,0,0],[0,0,0]];\nSearchIt;\nPDispOff;";
+    let frame = LeftReason::FrameUnknown.name();
+    for handler in ["ERROR", "UNDO", "BACKWARD"] {
+        for (body, corrected, left) in [
+            (format!("{step}\n{handler}\n{step}"), 2, vec![]),
+            (format!("{shift}\n{step}\n{handler}\n{step}"), 1, vec![frame]),
+            (format!("{shift}\n{step}\n{handler}\nPDispOff;\n{step}"), 2, vec![]),
+            (format!("IF a THEN\n{shift}\nENDIF\n{step}\n{handler}\n{step}"), 1, vec![frame]),
+            (format!("Shift;\n{step}\n{handler}\n{step}\nENDPROC\nPROC Shift()\n{shift}"), 1, vec![frame]),
+            (format!("{step}\n{handler}\n{step}\nENDPROC\nPROC Shift()\n{shift}"), 2, vec![]),
+            // Codes may count or not, and nothing tells the way.
+            (
+                format!("ConfJ\\Off;\nSearchIt;\nConfJ\\On;\n{step}\n{handler}\n{step}"),
+                1,
+                vec![LeftReason::PostureUnknown.name()],
+            ),
+        ] {
+            let told = run(&cell, &body, &[]).1.told();
+            let found: Vec<&str> = told.left.iter().map(|(.., reason)| reason.as_str()).collect();
+            assert_eq!((told.corrected, found), (corrected, left), "{body}");
+        }
+    }
+}

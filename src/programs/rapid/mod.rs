@@ -267,7 +267,7 @@ impl Task<'_> {
         let TargetKind::Pose(mut pose) = kind else { return kind };
         let upper = name.to_ascii_uppercase();
         let near = if upper.starts_with("MOVEL") { MeantPosture::Along } else { MeantPosture::Nearest };
-        pose.posture = match (self.switching.now().watched[usize::from(!is_of_joints(&upper))].value, pose.posture) {
+        pose.posture = match (*self.switching.now().watched[usize::from(!is_of_joints(&upper))].value(), pose.posture) {
             (Watched::Off, _) => near,
             (Watched::Unknown, MeantPosture::Coded(codes, axes)) => MeantPosture::Either(codes, axes),
             (_, posture) => posture,
@@ -347,7 +347,7 @@ impl Task<'_> {
             let frames = Box::new(frames.map(|(none, known)| StatedFrame::beside(&none, known)));
             return Ok(TargetKind::Joints(JointTarget { frames, ..self.joints(&parts[0], &external, file)? }));
         }
-        if self.switching.now().displaced.value {
+        if *self.switching.now().displaced.value() {
             let words = "a program displacement (PDispOn, PDispSet) may be active";
             return Err(Why::new(LeftReason::FrameUnknown, words));
         }
@@ -378,7 +378,7 @@ impl Task<'_> {
             return Err(Why::external(&axis, value));
         }
         let has_external = external.iter().any(|(value, _)| *value < NO_AXIS);
-        if self.switching.now().offset.value && has_external && !self.setting.axes_apart {
+        if *self.switching.now().offset.value() && has_external && !self.setting.axes_apart {
             let words = "an offset of external axes (EOffsOn, EOffsSet) may be active";
             return Err(Why::new(LeftReason::ExternalAxis, words));
         }

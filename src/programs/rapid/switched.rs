@@ -17,37 +17,118 @@ pub(super) enum Watched {
     Unknown,
 }
 
+/// Values of which either may hold.
+pub(super) trait Either {
+    /// What is known where one or the other holds.
+    fn either(&self, other: &Self) -> Self;
+}
+
+impl Either for Watched {
+    fn either(&self, other: &Self) -> Self {
+        if self == other { *self } else { Self::Unknown }
+    }
+}
+
+impl Either for bool {
+    fn either(&self, other: &Self) -> Self {
+        *self || *other
+    }
+}
+
+/// One thing that instructions switch.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Switch<V> {
+    held: Held<V>,
+    /// What the routine, and those that it has called, have switched it to at one time or another; `None` where they have not.
+    passed: Option<V>,
+}
+
+impl<V: Either + Clone + PartialEq> Switch<V> {
+    fn new(value: V) -> Self {
+        Self { held: Held::new(value), passed: None }
+    }
+
+    /// What holds.
+    pub fn value(&self) -> &V {
+        &self.held.value
+    }
+
+    /// An instruction switches it.
+    pub fn set(&mut self, value: V) {
+        self.passed = either(self.passed.as_ref(), Some(&value));
+        self.held.set(value);
+    }
+
+    /// The same where any statement of the routine may have been the last one: it began with `top`.
+    fn anywhere(mut self, top: &Self) -> Self {
+        if let Some(passed) = &self.passed {
+            self.held.set(self.value().either(passed).either(top.value()));
+        }
+        self
+    }
+
+    fn merged(&self, other: &Self) -> Self {
+        let passed = either(self.passed.as_ref(), other.passed.as_ref());
+        Self { held: self.held.merged(&other.held, V::either), passed }
+    }
+
+    fn at_top(&self) -> Self {
+        Self { held: self.held.at_top(), passed: None }
+    }
+
+    fn behind_call(&self, end: &Self) -> Self {
+        let passed = either(self.passed.as_ref(), end.passed.as_ref());
+        Self { held: self.held.behind_call(&end.held), passed }
+    }
+}
+
+fn either<V: Either + Clone>(one: Option<&V>, other: Option<&V>) -> Option<V> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(one.either(other)),
+        (one, other) => one.or(other).cloned(),
+    }
+}
+
 /// What instructions switch for those behind them.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Switched {
     /// The checks of configurations.
-    pub watched: [Held<Watched>; 2],
+    pub watched: [Switch<Watched>; 2],
     /// True where a program displacement may be active.
-    pub displaced: Held<bool>,
+    pub displaced: Switch<bool>,
     /// True where an offset of external axes may be active.
-    pub offset: Held<bool>,
+    pub offset: Switch<bool>,
 }
 
 impl Switched {
     /// Where nothing has switched anything yet.
     pub fn new(watched: [Watched; 2], displaced: bool, offset: bool) -> Self {
-        Self { watched: watched.map(Held::new), displaced: Held::new(displaced), offset: Held::new(offset) }
+        Self { watched: watched.map(Switch::new), displaced: Switch::new(displaced), offset: Switch::new(offset) }
+    }
+
+    /// The same where any statement of the routine may have been the last one: it began with `top`.
+    pub fn anywhere(self, top: &Self) -> Self {
+        let [joints, paths] = self.watched;
+        Self {
+            watched: [joints.anywhere(&top.watched[0]), paths.anywhere(&top.watched[1])],
+            displaced: self.displaced.anywhere(&top.displaced),
+            offset: self.offset.anywhere(&top.offset),
+        }
     }
 }
 
 impl Followed for Switched {
     fn merged(&self, other: &Self, _: &str) -> Self {
-        let watched = |k: usize| self.watched[k].merged(&other.watched[k], |_, _| Watched::Unknown);
         Self {
-            watched: [0, 1].map(watched),
-            displaced: self.displaced.merged(&other.displaced, |_, _| true),
-            offset: self.offset.merged(&other.offset, |_, _| true),
+            watched: [0, 1].map(|k| self.watched[k].merged(&other.watched[k])),
+            displaced: self.displaced.merged(&other.displaced),
+            offset: self.offset.merged(&other.offset),
         }
     }
 
     fn at_top(&self) -> Self {
         Self {
-            watched: [0, 1].map(|k| self.watched[k].at_top()),
+            watched: self.watched.each_ref().map(Switch::at_top),
             displaced: self.displaced.at_top(),
             offset: self.offset.at_top(),
         }

@@ -32,14 +32,17 @@ pub(super) struct Switching {
     /// The same of an offset of external axes.
     offsets: bool,
     now: Now,
+    /// What held where the routine began.
+    top: Switched,
     flow: Flow<Now>,
 }
 
 impl Switching {
     /// With what the reading before found, and the routines of the files.
     pub fn new(known: Places<Now>, routines: &Routines) -> Self {
-        let now = (Switched::new([Watched::On; 2], false, false), Stands::default());
-        Self { switched_off: [false; 2], displaces: false, offsets: false, now, flow: Flow::new(known).among(routines) }
+        let top = Switched::new([Watched::On; 2], false, false);
+        let (now, flow) = ((top.clone(), Stands::default()), Flow::new(known).among(routines));
+        Self { switched_off: [false; 2], displaces: false, offsets: false, now, top, flow }
     }
 
     /// A file begins.
@@ -103,6 +106,7 @@ impl Switching {
                 self.flow.routine_begins(routine_name(reader), &mut self.now, &uncalled);
                 // Modules that are not given may call it, too.
                 self.now = self.now.merged(&uncalled, "");
+                self.top = self.now.0.clone();
             }
             "ENDPROC" | "ENDFUNC" | "ENDTRAP" => self.flow.routine_ends(&mut self.now),
             "IF" => self.begin(Branching::If, way),
@@ -115,6 +119,7 @@ impl Switching {
             "ERROR" | "UNDO" | "BACKWARD" => {
                 // From anywhere in the routine.
                 self.flow.returns(&self.now);
+                self.now.0 = self.now.0.clone().anywhere(&self.top);
                 way.lose(&mut self.now.1);
             }
             "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => self.branches_end(way),
