@@ -94,6 +94,12 @@ fn known(own: StatedFrame, reason: LeftReason, word: &str, flag: &str) -> Unders
             );
             Err(Why::new(reason, words))
         }
+        StatedFrame::Elsewhere => {
+            let words = format!(
+                "the {word} was measured, and these joints are used with one that is elsewhere: a tool fixed in the room, work that moves"
+            );
+            Err(Why::new(reason, words))
+        }
         StatedFrame::Several => {
             let words =
                 format!("the {word} was measured, and these joints are used with several: give them a target for each");

@@ -174,6 +174,8 @@ pub enum StatedFrame {
     One(Pose),
     /// One now, another at another time.
     Several,
+    /// One that does not go with the flange, or does not stand in the base.
+    Elsewhere,
 }
 
 impl StatedFrame {

@@ -143,12 +143,12 @@ impl References {
         self.routines.iter().flat_map(|routine| &routine.parameters)
     }
 
-    /// Names that calls may change; `writes` tells it of routines in none of the files.
-    pub fn changed(&self, writes: impl Fn(&Call, &Given) -> bool) -> BTreeSet<String> {
+    /// Names that calls may change, with a routine that may do it; `writes` tells it of routines in none of the files.
+    pub fn changed(&self, writes: impl Fn(&Call, &Given) -> bool) -> BTreeMap<String, String> {
         let mut sets: Vec<BTreeSet<String>> = self.routines.iter().map(|routine| routine.sets.clone()).collect();
         let mut by_name = BTreeMap::<&str, Vec<usize>>::new();
         self.routines.iter().enumerate().for_each(|(k, r)| by_name.entry(&r.name).or_default().push(k));
-        let mut changed = BTreeSet::new();
+        let mut changed = BTreeMap::new();
         loop {
             let mut is_settled = true;
             for call in &self.calls {
@@ -167,12 +167,19 @@ impl References {
     }
 
     /// Notes that a call changes what it is given; false where that is known.
-    fn note(&self, call: &Call, given: &Given, sets: &mut [BTreeSet<String>], changed: &mut BTreeSet<String>) -> bool {
+    fn note(
+        &self,
+        call: &Call,
+        given: &Given,
+        sets: &mut [BTreeSet<String>],
+        changed: &mut BTreeMap<String, String>,
+    ) -> bool {
         let name = variable(&given.name);
         let own = call.within.filter(|&k| self.routines[k].parameters.iter().any(|p| p.name == name));
         match own {
             Some(k) => sets[k].insert(name.to_owned()),
-            None => changed.insert(given.name.clone()),
+            None if changed.contains_key(&given.name) => false,
+            None => changed.insert(given.name.clone(), call.routine.clone()).is_none(),
         }
     }
 }

@@ -48,6 +48,9 @@ fn what_routines_of_rapid_change_by_reference_is_not_corrected() {
         (format!("SearchL di1,p,c,v10,tA\\WObj:=wA;\n{to_p}"), "", vec![computed]),
         (format!("SetW wA;\n{to_c}"), "PROC SetW(INOUT wobjdata w)\nw.uframe.trans:=[9,9,9];\nENDPROC\n", vec![frame]),
         (format!("GetSysData wA;\n{to_c}"), "", vec![frame]),
+        // An instruction that names a tool and a work object goes there with them.
+        (format!("{to_c}\nPaintL v10,b1,fine,tA\\WObj:=wA;\n{to_c}"), "", vec![]),
+        (format!("{to_c}\nPaintOn\\WObj:=wA;"), "", vec![frame]),
         (format!("MToolTCPCalib j1,j2,j3,j4,tA,mx,mn;\n{to_c}"), "", vec![tool]),
         (format!("go p,tA,wA;\nSetSysData tA;\nTPWrite \"\"\\Num:=Distance(a,b);\n{to_c}"), go, vec![]),
         (format!("CapL p,v10,c1,fine,tA\\WObj:=wA;\n{to_p}"), "", vec![]),
@@ -127,5 +130,31 @@ fn frames_that_bas_sets_are_those_of_the_controller() {
         let frame = format!("MACHINE_FRAME_DAT[1]={{MACH_DEF_INDEX {index},PARENT[] \"DKP\",GEOMETRY[] \" \"}}\n");
         let found = moves("", &(tools.to_owned() + &frame)).1;
         assert_eq!(found.iter().map(|(_, _, reason)| reason.as_str()).collect::<Vec<_>>(), left, "{index}");
+    }
+}
+
+/// What may change a tool or a work object is named, and nothing says that its numbers are missing.
+#[test]
+fn what_may_change_a_frame_of_rapid_is_named() {
+    let mut cell = Cell::kuka(124);
+    let q = cell.readings();
+    let pose = rapid(&cell, &q);
+    let step = format!("MoveJ {pose},v10,fine,tA\\WObj:=wA;");
+    let routine = "ENDPROC\nPROC find(INOUT wobjdata w)\nw.uframe.trans.x:=9;";
+    for (body, names) in [
+        (format!("{step}\nwA.uframe.trans.x:=470;"), "m.mod:5"),
+        (format!("{step}\nGetSysData wA;"), "GETSYSDATA"),
+        (format!("{step}\n%\"find\"% wA;"), "computed"),
+        (format!("{step}\nfind wA;\n{routine}"), "FIND"),
+    ] {
+        let text = format!(
+            "MODULE m\nPERS tooldata tA:={TOOL};PERS wobjdata wA:={WORK};\nPROC main()\n{body}\nENDPROC\nENDMODULE\n"
+        );
+        let file = cell.write("m.mod", text.as_bytes());
+        let run = cell.compensate(&[&file], &["--unordered"]).expect(1);
+        assert!(run.told().has(4, "MoveJ", LeftReason::FrameUnknown), "{body}: {:?}", run.told());
+        let table = run.text("corrections.csv");
+        let left = table.lines().find(|l| l.ends_with(LeftReason::FrameUnknown.name())).unwrap();
+        assert!(left.contains(names) && left.contains("--work"), "{left}");
     }
 }

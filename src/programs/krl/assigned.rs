@@ -108,7 +108,7 @@ impl Assigned {
     pub fn changed_by_calls(&mut self, references: &References) {
         let parameters = references.parameters().map(|parameter| parameter.name.clone());
         let changed = references.changed(|call, given| !reads(&call.routine, &given.which));
-        parameters.chain(changed).for_each(|name| self.changes_somewhere(name));
+        parameters.chain(changed.into_keys()).for_each(|name| self.changes_somewhere(name));
     }
 
     /// True for a name whose value changes: as a parameter, by a component, beside its data, by an index that is computed, or by one of several

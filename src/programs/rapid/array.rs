@@ -18,10 +18,13 @@ impl Task<'_> {
         Ok(())
     }
 
-    /// Data of a name, or of the elements of an array, are computed.
-    pub(super) fn is_assigned(&mut self, name: &str) {
+    /// Data of a name, or of the elements of an array, are computed: `by` says what changes them.
+    pub(super) fn is_assigned(&mut self, name: &str, by: &str) {
         let own = |key: &String| key == name || array_of(key) == Some(name);
-        self.data.iter_mut().filter(|(key, _)| own(key)).for_each(|(_, datum)| datum.value = None);
+        for (_, datum) in self.data.iter_mut().filter(|(key, _)| own(key)) {
+            datum.before = datum.value.take().or(datum.before.take());
+            datum.changed.get_or_insert_with(|| by.to_owned());
+        }
     }
 
     /// A move to some element of an array: to all of them, in an order that the text does not tell.

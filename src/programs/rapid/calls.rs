@@ -68,6 +68,8 @@ const READ: [&str; 54] = [
     "WRITE",
     "WZHOMEJOINTDEF",
 ];
+/// The switch behind which instructions that move name their work object.
+const WORK: &str = "WOBJ";
 /// Stands for a routine whose name is computed.
 const LATE: &str = "%";
 
@@ -204,19 +206,22 @@ impl Task<'_> {
             true => given.which == Which::Nth(1),
             false => !reads(&call.routine) && !self.goes(call),
         });
-        for name in changed {
+        for (name, routine) in changed {
             let name = variable(&name);
             if self.data.get(name).is_some_and(|datum| !datum.is_constant) {
-                self.is_assigned(name);
+                let by: &str = if routine == LATE { "a call by a computed name" } else { &routine };
+                self.is_assigned(name, &format!("{by} may set what it is given"));
             }
         }
     }
 
-    /// True for an instruction that names a point and a tool: it goes there.
+    /// True for an instruction that names a tool, and a point or a work object behind `\WObj`: it goes somewhere with them, and what moves the
+    /// robot reads its tool and its work object.
     fn goes(&self, call: &Call) -> bool {
         let is_point = |name: &str| self.data.get(variable(name)).is_some_and(|d| d.kind == "ROBTARGET");
+        let is_work = |which: &Which| matches!(which, Which::Named(name) if name == WORK);
         call.calling == Calling::Instruction
-            && call.given.iter().any(|given| is_point(&given.name))
+            && call.given.iter().any(|given| is_point(&given.name) || is_work(&given.which))
             && call.given.iter().any(|given| self.is_tool(&given.name))
     }
 }

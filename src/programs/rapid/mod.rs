@@ -2,11 +2,13 @@
 
 mod array;
 mod calls;
+mod frames;
 mod moves;
 mod scopes;
 mod statements;
 mod switched;
 mod switching;
+mod untold;
 mod unvisited;
 mod uses;
 mod value;
@@ -21,8 +23,8 @@ use super::flow::{Places, settled};
 use super::itinerary::Itinerary;
 use super::names::{plain_error, plain_names};
 use super::program::{
-    Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, StatedFrame,
-    Target, TargetKind, Understood,
+    Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
+    TargetKind, Understood,
 };
 use super::reason::{DeclaredPoint, LeftReason, Why};
 use super::references::References;
@@ -35,16 +37,15 @@ use moves::{is_of_joints, is_to_joints};
 use scopes::Scopes;
 use switched::Watched;
 use switching::{Now, Switching};
+use untold::Untold;
 use uses::Use;
 use value::{
-    Displacement, NO_AXIS, Node, TYPES, array_of, check, computed, element, foreign_axis, frame, is_set, node, numbers,
+    Displacement, NO_AXIS, Node, TYPES, array_of, check, computed, element, foreign_axis, is_set, node, numbers,
     undeclared,
 };
 
 const DIALECT: Dialect =
     Dialect { comment: b'!', quotes: b"\"", header: None, based_numbers: false, latin_letters: true };
-/// The work object of moves that name none.
-const WORLD: &str = "WOBJ0";
 /// Most names that stand for each other.
 const MOST_NAMES: usize = 8;
 const DECIMALS_MM: usize = 4;
@@ -60,6 +61,10 @@ struct Datum {
     is_constant: bool,
     /// `None` where the text does not give its numbers.
     value: Option<Node>,
+    /// The value of its declaration, where something may change it.
+    before: Option<Node>,
+    /// What may change it, in words.
+    changed: Option<String>,
 }
 
 /// Reads modules that belong together.
@@ -149,7 +154,7 @@ impl Task<'_> {
             };
             let is_type = TYPES.contains(&word.as_str()) && reader.name_of(reader.at + 1).is_some();
             if self.data.contains_key(&word) && is_set(&mut reader) {
-                self.is_assigned(&word);
+                self.is_assigned(&word, &format!("{} sets it", reader.place()));
             }
             // A declaration assigns nothing.
             reader.at += if is_type { 2 } else { 1 };
@@ -191,10 +196,11 @@ impl Task<'_> {
             ));
         }
         // Two data of one name in one file belong to different routines.
-        let datum = Datum { kind, file: reader.index, line, is_constant, value: None };
         let is_twin = twin.is_some();
+        let changed = is_twin.then(|| "it is declared twice".to_owned());
+        let datum = Datum { kind, file: reader.index, line, is_constant, value: None, before: None, changed };
         if is_twin {
-            self.is_assigned(&name);
+            self.is_assigned(&name, "it is declared twice");
         } else if let (true, Some((rows, place))) = (is_array, &value) {
             self.elements_declared(&name, &datum, rows, place)?;
         }
@@ -335,16 +341,19 @@ impl Task<'_> {
         if visited { Ok(()) } else { Err(Why::of(&named, LeftReason::FramesDiffer, clash)) }
     }
 
-    fn kind(&self, value: &Node, file: usize, tool: Option<&str>, work: Understood<Pose>) -> Understood<TargetKind> {
+    fn kind(
+        &self,
+        value: &Node,
+        file: usize,
+        tool: Option<&str>,
+        work: std::result::Result<Pose, Untold>,
+    ) -> Understood<TargetKind> {
         let Node::List(parts) = value else {
             return Err(Why::new(LeftReason::NotATarget, "it is no robtarget and no jointtarget"));
         };
         let external = parts.last().and_then(numbers::<6>).unwrap_or_default();
         if parts.len() == 2 {
-            let (tool, base) = (tool.and_then(|name| self.tool(Some(name)).ok()), self.setting.base);
-            let work = work.ok().map(|work| base * work);
-            let frames = [(Pose::identity(), tool), (base, work)];
-            let frames = Box::new(frames.map(|(none, known)| StatedFrame::beside(&none, known)));
+            let frames = Box::new(self.beside_joints(tool, work));
             return Ok(TargetKind::Joints(JointTarget { frames, ..self.joints(&parts[0], &external, file)? }));
         }
         if *self.switching.now().displaced.value() {
@@ -389,7 +398,7 @@ impl Task<'_> {
         Ok(TargetKind::Pose(Box::new(PoseTarget {
             position: trans.map(|t| field(t, 1e-3, DECIMALS_MM)),
             rotation: RotationFields::Quaternion([x, y, z, w].map(|q| field(q, 1.0, DECIMALS_QUATERNION))),
-            base_from_work: self.setting.base * work?,
+            base_from_work: self.setting.base * work.or_else(|untold| untold.or_stated(self.setting.work))?,
             flange_from_tool: self.tool(tool)?,
             fixed,
             posture,
@@ -424,55 +433,5 @@ impl Task<'_> {
             target.fields[reading] = (k < 6).then_some(Field { file, place, written: *written, si, decimals });
         }
         Ok(target)
-    }
-
-    fn datum(&self, name: &str, kind: &str, flag: &str, reason: LeftReason) -> Understood<&Node> {
-        let of_kind = self.data.get(name).filter(|d| d.kind == kind);
-        let missing = || {
-            let words = format!("{name} is not written in numbers in the files (give its module as well, or {flag})");
-            Why::new(reason, words)
-        };
-        of_kind.and_then(|d| d.value.as_ref()).ok_or_else(missing)
-    }
-
-    fn tool(&self, name: Option<&str>) -> Understood<Pose> {
-        let read = || {
-            let unknown = |words: String| Why::new(LeftReason::ToolUnknown, words);
-            let name = name.ok_or_else(|| unknown("its tool is not named; give --tool".into()))?;
-            if name == "TOOL0" {
-                return Ok(Pose::identity());
-            }
-            let numbers = || unknown(format!("{name} is not written in numbers"));
-            let found = self.datum(name, "TOOLDATA", "--tool", LeftReason::ToolUnknown)?;
-            let Node::List(parts) = found else { return Err(numbers()) };
-            match parts.first() {
-                Some(Node::Word(w)) if w == "TRUE" => {}
-                _ => return Err(unknown(format!("{name} is a tool fixed in the room"))),
-            }
-            parts.get(1).and_then(frame).ok_or_else(numbers)
-        };
-        read().or_else(|why| self.setting.tool.ok_or(why))
-    }
-
-    /// Without a name it is `wobj0`.
-    fn work(&self, name: Option<&Node>) -> Understood<Pose> {
-        let name = match name {
-            None => return Ok(Pose::identity()),
-            Some(Node::Word(name)) if name == WORLD => return Ok(Pose::identity()),
-            Some(Node::Word(name)) => name,
-            Some(_) => return Err(Why::new(LeftReason::FrameUnknown, "its work object is computed")),
-        };
-        let read = || {
-            let unknown = |words: &str| Why::new(LeftReason::FrameUnknown, format!("{name} {words}"));
-            let found = self.datum(name, "WOBJDATA", "--work", LeftReason::FrameUnknown)?;
-            let Node::List(parts) = found else { return Err(unknown("is not written in numbers")) };
-            match (parts.first(), parts.get(1)) {
-                (Some(Node::Word(held)), Some(Node::Word(fixed))) if held == "FALSE" && fixed == "TRUE" => {}
-                _ => return Err(unknown("is held by the robot or moved by a unit")),
-            }
-            let frames = parts.get(3).and_then(frame).zip(parts.get(4).and_then(frame));
-            frames.map(|(user, object)| user * object).ok_or_else(|| unknown("is not written in numbers"))
-        };
-        read().or_else(|why| self.setting.work.ok_or(why))
     }
 }

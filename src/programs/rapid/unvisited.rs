@@ -1,6 +1,7 @@
 //! Declared targets to which no known move goes: by what other statements do with them, or by the flags.
 
 use super::switched::{DISPLACES, OFFSETS};
+use super::untold::Untold;
 use super::uses::{Does, Use};
 use super::value::{Node, array_of, element, node};
 use super::{Datum, Task};
@@ -54,7 +55,7 @@ impl Task<'_> {
     fn unvisited_kind(&self, name: &str, value: &Node, file: usize) -> Understood<TargetKind> {
         let untold = || {
             let words = "its work object is not named; give --work, and --tool where no tool is named either";
-            self.setting.work.ok_or_else(|| Why::new(LeftReason::FrameUnknown, words))
+            Err(Untold::Nowhere(Why::new(LeftReason::FrameUnknown, words)))
         };
         let uses = self.uses.get(name).map(Vec::as_slice).unwrap_or_default();
         let mut found: Option<TargetKind> = None;
