@@ -61,21 +61,6 @@ pub(super) trait Followed: Clone + PartialEq {
     fn behind_call(&self, end: &Self) -> Self;
 }
 
-/// One thing alone, `None` where it is not known.
-impl<V: Clone + PartialEq> Followed for Held<Option<V>> {
-    fn merged(&self, other: &Self, _: &str) -> Self {
-        Held::merged(self, other, |_, _| None)
-    }
-
-    fn at_top(&self) -> Self {
-        Held::at_top(self)
-    }
-
-    fn behind_call(&self, end: &Self) -> Self {
-        Held::behind_call(self, end)
-    }
-}
-
 /// Two things.
 impl<A: Followed, B: Followed> Followed for (A, B) {
     fn merged(&self, other: &Self, why: &str) -> Self {
@@ -115,11 +100,13 @@ pub(super) struct Places<T> {
     calls: BTreeMap<String, T>,
     /// At the end of each routine.
     ends: BTreeMap<String, T>,
+    /// At the jumps of each routine to labels.
+    jumps: BTreeMap<String, T>,
 }
 
 impl<T> Default for Places<T> {
     fn default() -> Self {
-        Self { loops: Vec::new(), calls: BTreeMap::new(), ends: BTreeMap::new() }
+        Self { loops: Vec::new(), calls: BTreeMap::new(), ends: BTreeMap::new(), jumps: BTreeMap::new() }
     }
 }
 
@@ -128,7 +115,8 @@ impl<T: Followed> Places<T> {
         let merge = |own: &mut T, other: &T| *own = own.merged(other, CALLS);
         let loops = self.loops.iter_mut().zip(&other.loops);
         loops.for_each(|(own, other)| own.iter_mut().zip(other).for_each(|(own, other)| merge(own, other)));
-        for (own, other) in [(&mut self.calls, &other.calls), (&mut self.ends, &other.ends)] {
+        let ends = (&mut self.ends, &other.ends);
+        for (own, other) in [(&mut self.calls, &other.calls), ends, (&mut self.jumps, &other.jumps)] {
             own.iter_mut().for_each(|(name, own)| other.get(name).iter().for_each(|other| merge(own, other)));
         }
         self
@@ -320,6 +308,21 @@ impl<T: Followed> Flow<T> {
         self.is_reached = true;
     }
 
+    /// A jump to a label of the innermost routine, from where `now` holds.
+    pub fn jumps(&mut self, now: &T) {
+        if let Some(routine) = self.routines.last() {
+            let jumps = self.found.jumps.entry(routine.name.clone());
+            jumps.and_modify(|all| *all = all.merged(now, BRANCHES)).or_insert_with(|| now.clone());
+        }
+        self.goes_elsewhere();
+    }
+
+    /// What holds at a label, to which any of these jumps may lead.
+    pub fn at_label(&self, now: &T) -> T {
+        let jumps = self.routines.last().and_then(|routine| self.known.jumps.get(&routine.name));
+        jumps.map_or_else(|| now.clone(), |jumps| now.merged(jumps, BRANCHES))
+    }
+
     /// A routine begins, inside another one where that is still open; `uncalled` holds at its top where nothing calls it.
     pub fn routine_begins(&mut self, name: String, now: &mut T, uncalled: &T) {
         let name = self.meant(&name).pop().unwrap_or(name);
@@ -396,6 +399,21 @@ mod tests {
     use super::*;
 
     type Tool = Held<Option<u8>>;
+
+    /// One thing alone, `None` where it is not known.
+    impl<V: Clone + PartialEq> Followed for Held<Option<V>> {
+        fn merged(&self, other: &Self, _: &str) -> Self {
+            Held::merged(self, other, |_, _| None)
+        }
+
+        fn at_top(&self) -> Self {
+            Held::at_top(self)
+        }
+
+        fn behind_call(&self, end: &Self) -> Self {
+            Held::behind_call(self, end)
+        }
+    }
 
     /// Behind a statement whose branches leave these tools, begun with tool 0.
     fn behind(branches: &[u8], has_else: bool) -> Option<u8> {

@@ -1,9 +1,9 @@
 //! What interrupts and triggers run beside the text, at a time that it does not tell: `INTERRUPT DECL n WHEN .. DO ..`, `TRIGGER WHEN .. DO ..`.
 
-use super::Module;
 use super::assigned::assigned;
 use super::frames::{FrameIs, Frames};
-use crate::programs::flow::Followed;
+use super::{Module, Now};
+use crate::programs::flow::{Followed, Held};
 use crate::programs::scan::Reader;
 
 /// Frames that such a statement sets itself (`DO $BASE=..`), without a routine.
@@ -25,16 +25,27 @@ fn frame_set(reader: &mut Reader<'_>) -> Option<String> {
     set.filter(|name| FRAMES.contains(&name.as_str()))
 }
 
+fn at_some_time(frame: &mut Held<FrameIs>) {
+    let other = frame.value.at_some_time(ANY_TIME);
+    frame.set(other);
+}
+
 impl Module<'_> {
     /// A routine that begins with frames which the text does not tell.
     pub(super) fn begins_beside(&mut self, name: String) {
-        let unknown = || FrameIs::Unknown(RUN_AT_ANY_TIME.into());
-        let (mut active, stands) = self.now.clone();
-        active.set(Frames { tool: unknown(), base: unknown(), tool_in_room: active.tool_in_room.value });
         let meant = self.flow.meant(&name);
-        meant.iter().for_each(|name| _ = active.beside.value.remove(name));
-        self.flow.begins_beside(&name, &(active, stands));
+        let top = self.top_beside(&meant);
+        self.flow.begins_beside(&name, &top);
         meant.into_iter().for_each(|name| self.goes_on_beside(name));
+    }
+
+    /// What such a routine, by the names that are its own, begins with where the event comes here.
+    fn top_beside(&self, names: &[String]) -> Now {
+        let (mut active, stands) = self.now.clone();
+        let [tool, base] = [&active.tool, &active.base].map(|is| is.value.at_some_time(RUN_AT_ANY_TIME));
+        active.set(Frames { tool, base, tool_in_room: active.tool_in_room.value });
+        names.iter().for_each(|name| _ = active.beside.value.remove(name));
+        (active, stands)
     }
 
     /// A statement that sets a frame at any time.
@@ -56,9 +67,12 @@ impl Module<'_> {
         }
         for name in self.now.0.beside.value.clone() {
             match name.as_str() {
-                "$TOOL" => self.now.0.tool.set(FrameIs::Unknown(ANY_TIME.into())),
-                "$BASE" => self.now.0.base.set(FrameIs::Unknown(ANY_TIME.into())),
+                "$TOOL" => at_some_time(&mut self.now.0.tool),
+                "$BASE" => at_some_time(&mut self.now.0.base),
                 routine => {
+                    // The event may come here.
+                    let top = self.top_beside(std::slice::from_ref(&name));
+                    self.flow.begins_beside(routine, &top);
                     if let Some((behind, _)) = self.flow.behind(routine, &self.now) {
                         self.now.0 = self.now.0.merged(&behind, ANY_TIME);
                     }

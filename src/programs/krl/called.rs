@@ -62,7 +62,7 @@ impl Module<'_> {
     }
 
     fn may_change(&mut self, name: &str) {
-        let unknown = FrameIs::Unknown("a routine that it is given to may change it".into());
+        let unknown = FrameIs::untold("a routine that it is given to may change it");
         match name {
             "$TOOL" => self.now.0.tool.set(unknown),
             "$BASE" => self.now.0.base.set(unknown),

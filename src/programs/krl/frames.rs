@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::geom::Pose;
 use crate::programs::flow::{Followed, Held};
+use crate::programs::program::StatedFrame;
+use crate::programs::scan::Reader;
 
 /// Where a frame comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,7 +14,114 @@ pub(super) enum FrameIs {
     /// Not set in the text so far.
     Unset,
     /// Set to something that the text does not tell.
-    Unknown(String),
+    Unknown(Unknown),
+}
+
+/// A frame of which the text does not tell which it is.
+#[derive(Debug, Clone)]
+pub(super) struct Unknown {
+    why: String,
+    /// Frames in the text of which each may be it.
+    may_be: Vec<Pose>,
+    /// True where it may not stand still.
+    may_move: bool,
+}
+
+/// The frames in whatever order.
+impl PartialEq for Unknown {
+    fn eq(&self, other: &Self) -> bool {
+        let has_all = |one: &Self, other: &Self| one.may_be.iter().all(|pose| other.may_be.contains(pose));
+        (&self.why, self.may_move) == (&other.why, other.may_move) && has_all(self, other) && has_all(other, self)
+    }
+}
+
+impl FrameIs {
+    /// One whose value the text has nowhere.
+    pub fn untold(why: impl Into<String>) -> Self {
+        Self::Unknown(Unknown { why: why.into(), may_be: Vec::new(), may_move: false })
+    }
+
+    /// One that a kinematic moves.
+    pub fn moving(why: impl Into<String>) -> Self {
+        Self::Unknown(Unknown { why: why.into(), may_be: Vec::new(), may_move: true })
+    }
+
+    /// `$BASE` on an external kinematic.
+    pub fn on_kinematic() -> Self {
+        Self::moving("it is on an external kinematic")
+    }
+
+    /// The same where `EK(..)` stands before the reader.
+    pub fn coupled(reader: &Reader<'_>) -> Option<Self> {
+        (reader.ahead_is_word(0, "EK") && reader.ahead_is_mark(1, b'(')).then(Self::on_kinematic)
+    }
+
+    /// This one, or another that holds at another time.
+    pub fn at_some_time(&self, why: &str) -> Self {
+        self.either(self, why)
+    }
+
+    /// This one or the other.
+    pub fn either(&self, other: &Self, why: &str) -> Self {
+        let mut may_be = self.may_be();
+        other.may_be().into_iter().for_each(|pose| {
+            if !may_be.contains(&pose) {
+                may_be.push(pose);
+            }
+        });
+        let why = match (self, other) {
+            (Self::Unknown(one), Self::Unknown(other)) if one.why == other.why && one != other => &one.why,
+            _ => why,
+        };
+        Self::Unknown(Unknown { why: why.to_owned(), may_be, may_move: self.may_move() || other.may_move() })
+    }
+
+    /// The frame; where the text tells none, that which the user states, unless the text has another that may hold.
+    pub fn or_stated(&self, stated: Option<Pose>) -> Option<Pose> {
+        match self {
+            Self::Known(pose) => Some(*pose),
+            Self::Unset => stated,
+            Self::Unknown(unknown) => stated
+                .filter(|stated| !unknown.may_move && unknown.may_be.iter().all(|pose| pose.misfit(stated) < 1e-6)),
+        }
+    }
+
+    /// Why the frame of this name is not known.
+    pub fn why(&self, name: &str, flag: &str) -> String {
+        match self {
+            Self::Unknown(Unknown { why, may_be, may_move: false }) if may_be.is_empty() => {
+                format!("{name} is not known: {why}, or give {flag}")
+            }
+            Self::Unknown(unknown) => format!("{name} is not known: {}", unknown.why),
+            Self::Unset | Self::Known(_) => format!("{name} is not set before it; give {flag}"),
+        }
+    }
+
+    /// The frame of a motion to axes, seen from another one.
+    fn beside_joints(&self, stated: Option<Pose>, from: &Pose) -> StatedFrame {
+        let one = |pose: Pose| StatedFrame::beside(from, Some(*from * pose));
+        match self {
+            Self::Known(pose) => one(*pose),
+            Self::Unset => StatedFrame::Unsaid,
+            Self::Unknown(Unknown { may_move: true, .. }) => StatedFrame::Elsewhere,
+            Self::Unknown(unknown) if unknown.may_be.iter().all(|pose| *pose == Pose::identity()) => {
+                StatedFrame::Unsaid
+            }
+            Self::Unknown(_) => self.or_stated(stated).map_or(StatedFrame::Several, one),
+        }
+    }
+
+    fn may_be(&self) -> Vec<Pose> {
+        match self {
+            Self::Known(pose) => vec![*pose],
+            Self::Unset => Vec::new(),
+            Self::Unknown(unknown) => unknown.may_be.clone(),
+        }
+    }
+
+    fn may_move(&self) -> bool {
+        matches!(self, Self::Unknown(Unknown { may_move: true, .. }))
+    }
 }
 
 /// `$TOOL`, `$BASE` and `$IPO_MODE` of a motion.
@@ -27,6 +136,15 @@ pub(super) struct Frames {
 impl Default for Frames {
     fn default() -> Self {
         Self { tool: FrameIs::Unset, base: FrameIs::Unset, tool_in_room: false }
+    }
+}
+
+impl Frames {
+    /// Tool and `base_from_work` of a motion to axes; those that the user states and the foot of the robot beside them.
+    pub fn beside_joints(&self, stated: [Option<Pose>; 2], base: &Pose) -> [StatedFrame; 2] {
+        let none = Pose::identity();
+        let tool = if self.tool_in_room { StatedFrame::Elsewhere } else { self.tool.beside_joints(stated[0], &none) };
+        [tool, self.base.beside_joints(stated[1], base)]
     }
 }
 
@@ -68,10 +186,10 @@ impl Active {
 
 impl Followed for Active {
     fn merged(&self, other: &Self, why: &str) -> Self {
-        let unknown = |_: &FrameIs, _: &FrameIs| FrameIs::Unknown(why.to_owned());
+        let either = |one: &FrameIs, other: &FrameIs| one.either(other, why);
         Self {
-            tool: self.tool.merged(&other.tool, unknown),
-            base: self.base.merged(&other.base, unknown),
+            tool: self.tool.merged(&other.tool, either),
+            base: self.base.merged(&other.base, either),
             tool_in_room: self.tool_in_room.merged(&other.tool_in_room, |_, _| true),
             keeps_orientation: self.keeps_orientation.merged(&other.keeps_orientation, |_, _| true),
             is_sensed: self.is_sensed.merged(&other.is_sensed, |_, _| true),

@@ -33,7 +33,7 @@ use super::ProgramSetting;
 use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::names::{plain_error, plain_names};
-use super::program::{JointTarget, Left, PoseTarget, Program, StatedFrame, TargetKind, Understood};
+use super::program::{JointTarget, Left, PoseTarget, Program, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use super::references::References;
 use super::routines::Routines;
@@ -224,13 +224,14 @@ impl Module<'_> {
             self.now.0.keeps_orientation.set(keeps);
             return Ok(());
         }
+        let coupled = FrameIs::coupled(reader);
         let value = match component {
             true => Value::Expression,
             false => self.value(reader)?,
         };
         match name.as_str() {
             "$TOOL" => self.now.0.tool.set(self.frame(&value)),
-            "$BASE" => self.now.0.base.set(self.frame(&value)),
+            "$BASE" => self.now.0.base.set(coupled.unwrap_or_else(|| self.frame(&value))),
             "$ROBROOT" => self.root = self.frame(&value),
             "FDAT_ACT" => self.use_data(&value),
             "LDAT_ACT" => self.path_data = Some(self.keeps_by_data(&value)),
@@ -314,7 +315,7 @@ impl Module<'_> {
                 self.flow.routine_begins(name, &mut self.now, &unset());
             }
             "RETURN" => self.flow.returns(&self.now),
-            "GOTO" => self.flow.goes_elsewhere(),
+            "GOTO" => self.flow.jumps(&self.now),
             "EXIT" => self.flow.leaves(&self.now),
             "END" | "ENDFCT" => self.flow.routine_ends(&mut self.now),
             "IF" | "SWITCH" | "WHILE" | "LOOP" | "FOR" | "REPEAT" => {
@@ -347,8 +348,11 @@ impl Module<'_> {
 
     /// `NAME:`, to which GOTO may come from anywhere in the routine.
     fn label(&mut self) {
-        let unknown = || FrameIs::Unknown("a GOTO may come from elsewhere".into());
-        self.now.0.set(Frames { tool: unknown(), base: unknown(), tool_in_room: self.now.0.tool_in_room.value });
+        let (mut active, _) = self.flow.at_label(&self.now);
+        let [tool, base] =
+            [&active.tool, &active.base].map(|is| is.value.at_some_time("a GOTO may come from elsewhere"));
+        active.set(Frames { tool, base, tool_in_room: active.tool_in_room.value });
+        self.now.0 = active;
         self.flow.arrives();
         self.way.lose(&mut self.now.1);
     }
@@ -367,11 +371,8 @@ impl Module<'_> {
     fn kind(&self, a: &Aggregate, frames: &Frames) -> Understood<TargetKind> {
         let axes = self.setting.axes;
         if a.has(&AXIS_NAMES) {
-            let known = |is: &FrameIs| if let FrameIs::Known(pose) = is { Some(*pose) } else { None };
-            let (tool, base) = (known(&frames.tool), known(&frames.base));
-            let none = Pose::identity();
-            let work = StatedFrame::beside(&self.setting.base, base.map(|base| self.setting.base * base));
-            let frames = Box::new([StatedFrame::beside(&none, tool.filter(|_| !frames.tool_in_room)), work]);
+            let stated = [self.setting.tool, self.setting.work];
+            let frames = Box::new(frames.beside_joints(stated, &self.setting.base));
             return Ok(TargetKind::Joints(JointTarget { frames, ..a.joints(axes, &self.prismatic) }));
         }
         if !a.has(&POSE_NAMES) {
@@ -397,13 +398,8 @@ impl Module<'_> {
         if let Some((name, value)) = a.foreign(axes).filter(|_| !self.setting.axes_apart) {
             return Err(Why::external(&name, value));
         }
-        let frame = |reason, name: &str, is: &FrameIs, flag: Option<Pose>, flag_name: &str| match (is, flag) {
-            (FrameIs::Known(pose), _) => Ok(*pose),
-            (_, Some(pose)) => Ok(pose),
-            (FrameIs::Unknown(why), _) => {
-                Err(Why::new(reason, format!("{name} is not known: {why}, or give {flag_name}")))
-            }
-            (FrameIs::Unset, _) => Err(Why::new(reason, format!("{name} is not set before it; give {flag_name}"))),
+        let frame = |reason, name: &str, is: &FrameIs, stated: Option<Pose>, flag: &str| {
+            is.or_stated(stated).ok_or_else(|| Why::new(reason, is.why(name, flag)))
         };
         Ok(TargetKind::Pose(Box::new(PoseTarget {
             position: a.position(),

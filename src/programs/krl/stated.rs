@@ -17,12 +17,10 @@ impl Module<'_> {
         match self.resolved(value) {
             Ok((aggregate, _)) => match aggregate.frame() {
                 Some(frame) => FrameIs::Known(frame),
-                None => FrameIs::Unknown("not all of X, Y, Z, A, B, C are given".into()),
+                None => FrameIs::untold("not all of X, Y, Z, A, B, C are given"),
             },
-            Err(why) if why.reason == LeftReason::Computed => {
-                FrameIs::Unknown("it is computed, not written in numbers".into())
-            }
-            Err(why) => FrameIs::Unknown(why.words),
+            Err(why) if why.reason == LeftReason::Computed => FrameIs::untold("it is computed, not written in numbers"),
+            Err(why) => FrameIs::untold(why.words),
         }
     }
 
@@ -31,7 +29,7 @@ impl Module<'_> {
         match number {
             0 => FrameIs::Known(Pose::identity()),
             n if table == "BASE_DATA" && self.is_on_kinematic(n) => {
-                FrameIs::Unknown(format!("MACHINE_FRAME_DAT[{n}] puts it on an external kinematic"))
+                FrameIs::moving(format!("MACHINE_FRAME_DAT[{n}] puts it on an external kinematic"))
             }
             n => self.frame(&Value::Name(format!("{table}[{n}]"))),
         }
@@ -60,17 +58,17 @@ impl Module<'_> {
         let data = self.frames_of(taken.as_ref());
         // Frames that are in force stay so until `BAS(#FRAMES)`, or what sets the rest of a motion, takes the data.
         let stays = |is: &FrameIs, new: &FrameIs| matches!(is, FrameIs::Known(_)) && is != new;
-        let active = &self.now.0;
-        let waits = stays(&active.tool.value, &data.tool) || stays(&active.base.value, &data.base);
-        let untaken = || FrameIs::Unknown("no BAS(#FRAMES) takes the motion data before it".into());
-        let now = Frames { tool: untaken(), base: untaken(), ..data.clone() };
+        let (tool, base) = (&self.now.0.tool.value, &self.now.0.base.value);
+        let waits = stays(tool, &data.tool) || stays(base, &data.base);
+        let untaken = |is: &FrameIs, new| is.either(new, "no BAS(#FRAMES) takes the motion data before it");
+        let now = Frames { tool: untaken(tool, &data.tool), base: untaken(base, &data.base), ..data.clone() };
         self.now.0.set(if waits { now } else { data });
         self.motion_data = Some(taken);
     }
 
     /// Tool and base of motion data by what the frames of these numbers hold here.
     fn frames_of(&self, data: Option<&Aggregate>) -> Frames {
-        let unknown = || FrameIs::Unknown("its motion data are in none of the files (give the .dat as well)".into());
+        let unknown = || FrameIs::untold("its motion data are in none of the files (give the .dat as well)");
         let frames = data.and_then(|data| self.data_frames(data));
         frames.unwrap_or_else(|| Frames { tool: unknown(), base: unknown(), ..Frames::default() })
     }
@@ -124,6 +122,9 @@ impl Module<'_> {
 
     /// A frame as the inline forms state it: an aggregate, `TOOL_DATA[1]`, `STOOL2(FP1)`, `SBASE(FP1.BASE_NO)` or a number in brackets.
     fn stated_frame(&self, reader: &mut Reader<'_>, table: &str, number: &str) -> FrameIs {
+        if let Some(coupled) = FrameIs::coupled(reader) {
+            return coupled;
+        }
         let called = reader.ahead_is_mark(1, b'(');
         if !called {
             let value = match reader.is_mark(b'{') {
@@ -134,7 +135,7 @@ impl Module<'_> {
                     Ok(name.map_or(Value::Expression, |n| Value::Name(n + &index(reader))))
                 }
             };
-            return value.map_or_else(|e| FrameIs::Unknown(e.what), |v| self.frame(&v));
+            return value.map_or_else(|e| FrameIs::untold(e.what), |v| self.frame(&v));
         }
         reader.at += 2;
         if let Some((n, _)) = reader.take_number() {
@@ -144,7 +145,7 @@ impl Module<'_> {
         let found = self.resolved(&data).ok().and_then(|(data, _)| data.whole(number));
         match found {
             Some(n) => self.numbered(table, n),
-            None => FrameIs::Unknown("its number is in none of the files (give the .dat as well)".into()),
+            None => FrameIs::untold("its number is in none of the files (give the .dat as well)"),
         }
     }
 
@@ -170,11 +171,12 @@ impl Module<'_> {
         let number = reader.take_number().map(|(n, _)| n as i64);
         let frame = |table| match number {
             Some(n) => self.numbered(table, n),
-            None => FrameIs::Unknown("its number is computed".into()),
+            None => FrameIs::untold("its number is computed"),
         };
         match what.as_deref() {
             Some("TOOL") => self.now.0.tool.set(frame("TOOL_DATA")),
             Some("BASE") => self.now.0.base.set(frame("BASE_DATA")),
+            Some("EX_BASE") => self.now.0.base.set(FrameIs::on_kinematic()),
             Some("CP_DAT") => self.take_path_data(),
             Some(taken) if taken == "FRAMES" || taken.ends_with("PARAMS") => {
                 self.take_data();
