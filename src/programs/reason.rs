@@ -24,6 +24,8 @@ pub enum LeftReason {
     ExternalAxis,
     /// On the way there the tool keeps its orientation, whatever the target says.
     OrientationKept,
+    /// Its path ends elsewhere, before or beyond its points.
+    PathEnd,
     /// It is used with different tools or frames.
     FramesDiffer,
     /// No motion of the files goes there, and so much of it is not known.
@@ -55,6 +57,7 @@ impl LeftReason {
             Self::FrameUnknown => "frame_unknown",
             Self::ExternalAxis => "external_axis",
             Self::OrientationKept => "orientation_kept",
+            Self::PathEnd => "path_end",
             Self::FramesDiffer => "frames_differ",
             Self::Unvisited => "unvisited",
             Self::PostureUnknown => "posture_unknown",

@@ -78,7 +78,9 @@ fn blocks_labels_and_circles_that_go_on_are_no_targets_of_their_own() {
     for (body, corrected, left) in [
         ("PTP SPLINE\nSPTP @\nENDSPLINE\n", 1, vec![]),
         ("CIRC @,@\nLIN {Z 480}\n", 3, vec![]),
-        ("CIRC @,@,CA 90.0\nLIN {Z 480}\n", 2, vec![name(LeftReason::Incomplete)]),
+        ("CIRC @,@,CA 90.0\nLIN {Z 480}\n", 2, vec![name(LeftReason::Incomplete), name(LeftReason::PathEnd)]),
+        ("SPLINE\nSCIRC @,@,ca A\nENDSPLINE\nLIN @\n", 3, vec![name(LeftReason::PathEnd)]),
+        ("CIRC @,@ C_DIS\nCIRC @,@,CA 360\n", 4, vec![name(LeftReason::PathEnd)]),
         (
             "LIN @\n$BASE={X 50,Y 0,Z 0,A 0,B 0,C 0}\nHERE:\nLIN @\nIF $IN[1] THEN\nGOTO HERE\nENDIF\n",
             1,

@@ -70,8 +70,8 @@ impl Module<'_> {
             auxiliary = Some(value);
         }
         if reader.rest_of_line_has("CA") {
-            // The circle goes on, or ends before the point.
-            self.way.go_beyond(&mut self.now.1);
+            let words = "its circle ends at an angle (CA), not at its points: where the real robot ends is not corrected (let it end at a point, without CA)";
+            self.leave_at(place.0, place.1, name, Why::new(LeftReason::PathEnd, words));
         }
         self.time_passes();
         Ok(())
