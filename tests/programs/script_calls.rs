@@ -115,3 +115,20 @@ fn behind_a_call_that_may_go_to_a_position_the_posture_is_not_known() {
     let told = cell.compensate(&[&file], &["--unordered"]).expect(1).told();
     assert!(told.has(4, "cap_move", no_target) && told.has(5, "movel", posture), "{told:?}");
 }
+
+/// On an arc in fixed mode the tool keeps its orientation to the path, whatever its targets say.
+#[test]
+fn targets_of_an_arc_on_which_the_tool_is_turned_with_the_path_are_left() {
+    let cell = Cell::ur(215);
+    let kept = vec![LeftReason::OrientationKept; 2];
+    for (mode, left) in [
+        ("", vec![]),
+        (", 1.2, 0.25, 0, 0", vec![]),
+        (", mode=0", vec![]),
+        (", 1.2, 0.25, 0, 1", kept.clone()),
+        (", a=1.2, mode=1", kept.clone()),
+        (", mode=m", kept),
+    ] {
+        assert_told(&cell, ("", &format!("  movec(@, @{mode})\n")), 2 - left.len(), &left);
+    }
+}

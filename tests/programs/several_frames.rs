@@ -255,3 +255,41 @@ fn joints_used_with_two_tools_are_left() {
     assert_eq!(of([&tool, &Pose::identity()]), [None]);
     assert_eq!(of([&tool, &other]), [Some(LeftReason::ToolUnknown)]);
 }
+
+/// A tool in the room and one of several that a branch leaves are none that another one stands for, at joints as at poses.
+#[test]
+fn joints_of_a_tool_in_the_room_or_of_one_of_several_are_left() {
+    let cell = Cell::kuka(318);
+    let tool = Pose::from_xyz_rpy([0.01, -0.02, 0.15], [0.0, 0.4, 1.2]);
+    let to = RobotFrames { tool: Some(MeasuredTool::Pose(tool)), work: None };
+    let of = |name: &str, text: &str, stated: &Pose| {
+        left(&corrected(&cell, name, text, to, &Stated { tool: Some(*stated), ..Stated::default() }))
+    };
+    let deg = READINGS.map(|q| format!("{:.6}", q.to_degrees()));
+    let axes = (1..=6).zip(&deg).map(|(k, q)| format!("A{k} {q}")).collect::<Vec<_>>().join(",");
+    let place = format!("[[{}],[9E9,9E9,9E9,9E9,9E9,9E9]]", deg.join(","));
+    let (unknown, other) = (Some(LeftReason::ToolUnknown), moved(&tool, 0.1));
+    for (held, wanted) in [("TRUE", unknown), ("FALSE", unknown)] {
+        let data = format!("[{held},[[100,0,0],[1,0,0,0]],[1,[0,0,0],[1,0,0,0],0,0,0]]");
+        let text =
+            format!("MODULE m\nPERS tooldata t:={data};\nPROC main()\nMoveAbsJ {place},v1,z1,t;\nENDPROC\nENDMODULE\n");
+        assert_eq!(of("m.mod", &text, &tool), [wanted], "{held}");
+    }
+    let go = format!("PTP {{{axes}}}");
+    let set = |tool: &Pose| format!("$TOOL={}\n", krl(tool));
+    let maybe = |first: &Pose, second: &Pose| format!("{}IF $IN[1] THEN\n{}ENDIF\n{go}", set(first), set(second));
+    for (body, wanted) in [
+        (format!("{}{go}", set(&tool)), None),
+        (format!("{}$IPO_MODE=#TCP\n{go}", set(&tool)), unknown),
+        (maybe(&tool, &tool), None),
+        (maybe(&tool, &other), unknown),
+        (format!("$TOOL=GET()\n{go}"), None),
+    ] {
+        assert_eq!(of("a.src", &format!("DEF a()\n{body}\nEND\n"), &tool), [wanted], "{body}");
+    }
+    let q = READINGS.map(|q| q.to_string()).join(",");
+    let script = |body: &str| format!("def a():\n{body}  movej([{q}])\nend\n");
+    for (body, wanted) in [("", None), ("  if x:\n    set_tcp(p[0.3,0,0,0,0,0])\n  end\n", unknown)] {
+        assert_eq!(of("a.script", &script(body), &tool), [wanted], "{body}");
+    }
+}

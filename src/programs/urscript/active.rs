@@ -2,6 +2,8 @@
 
 use crate::geom::Pose;
 use crate::programs::flow::{Followed, Held};
+use crate::programs::program::{StatedFrame, Understood};
+use crate::programs::reason::{LeftReason, Why};
 
 /// What moves the tool on top of the targets, and how many such things there are.
 const CONVEYOR: usize = 0;
@@ -16,11 +18,48 @@ const SWITCHES: [(&[u8], usize, bool); 5] = [
     (b"path_offset_disable", PATH_OFFSET, false),
 ];
 
+/// The tool, and why it is not known.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum ToolIs {
+    Known(Pose),
+    /// Neither the text nor the user has set one.
+    Unset,
+    /// The text sets it to something that is not written in numbers.
+    Computed,
+    /// The text sets several, or on some ways none: how, in words.
+    Several(String),
+}
+
+impl ToolIs {
+    /// The tool.
+    ///
+    /// # Errors
+    /// Why it is not known.
+    pub fn known(&self) -> Understood<Pose> {
+        let words = match self {
+            Self::Known(pose) => return Ok(*pose),
+            Self::Unset => "no set_tcp(p[..]) before it; give --tool",
+            Self::Computed => "the set_tcp before it is computed, not written in numbers",
+            Self::Several(why) => why,
+        };
+        Err(Why::new(LeftReason::ToolUnknown, format!("its tool is not known: {words}")))
+    }
+
+    /// That of a move to joints.
+    pub fn beside_joints(&self) -> StatedFrame {
+        match self {
+            Self::Known(pose) => StatedFrame::beside(&Pose::identity(), Some(*pose)),
+            Self::Unset | Self::Computed => StatedFrame::Unsaid,
+            Self::Several(_) => StatedFrame::Several,
+        }
+    }
+}
+
 /// What holds at a move.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Active {
-    /// The active tool; `None` where it is not known.
-    pub tool: Held<Option<Pose>>,
+    /// The active tool.
+    pub tool: Held<ToolIs>,
     /// True for what may move the tool on top of the targets.
     on_top: [Held<bool>; ON_TOP],
 }
@@ -28,7 +67,7 @@ pub(super) struct Active {
 impl Active {
     /// Where nothing has set anything yet.
     pub fn new(tool: Option<Pose>) -> Self {
-        Self { tool: Held::new(tool), on_top: [false; ON_TOP].map(Held::new) }
+        Self { tool: Held::new(tool.map_or(ToolIs::Unset, ToolIs::Known)), on_top: [false; ON_TOP].map(Held::new) }
     }
 
     /// A call that begins or ends a motion on top of that of the targets; false for any other.
@@ -47,7 +86,9 @@ impl Active {
 impl Followed for Active {
     fn merged(&self, other: &Self, why: &str) -> Self {
         let on_top = [CONVEYOR, PATH_OFFSET].map(|k| self.on_top[k].merged(&other.on_top[k], |_, _| true));
-        Self { tool: Followed::merged(&self.tool, &other.tool, why), on_top }
+        let words = || format!("set_tcp sets several on the ways to it, or none on some ({why})");
+        let several = |_: &ToolIs, _: &ToolIs| ToolIs::Several(words());
+        Self { tool: self.tool.merged(&other.tool, several), on_top }
     }
 
     fn at_top(&self) -> Self {

@@ -8,6 +8,8 @@ use crate::programs::scan::TokenKind;
 
 /// Parameters of `get_inverse_kin`, in their order.
 const INVERSE: [&[u8]; 5] = [b"x", b"qnear", b"maxPositionError", b"maxOrientationError", b"tcp"];
+/// Parameters of `movec`, in their order.
+const ARC: [&[u8]; 6] = [b"pose_via", b"pose_to", b"a", b"v", b"r", b"mode"];
 /// Its tool where none is named.
 const ACTIVE: &[u8] = b"active_tcp";
 
@@ -22,20 +24,24 @@ impl Script<'_> {
         let taught = self.taught();
         let value = self.argument()?;
         let keeps = way != Way::Joints || matches!(value, Value::Pose(..));
-        Ok(Argument { value, taught, posture: way.posture(), tool: self.active_tool(), points: Vec::new(), keeps })
+        Ok(Argument { taught, posture: way.posture(), keeps, ..self.untaught(value) })
+    }
+
+    /// A value with the active tool, to which the robot goes in its posture.
+    fn untaught(&self, value: Value) -> Argument {
+        let (posture, tool) = (MeantPosture::Nearest, self.active_tool());
+        Argument { value, taught: None, posture, tool, points: Vec::new(), keeps: true, turns_as_told: true }
     }
 
     /// The pose in `get_inverse_kin(..)`, on whose name the reader stands; it ends behind the bracket.
     fn inverse(&mut self) -> Result<Argument> {
-        let (value, tool) = (Value::Expression, self.active_tool());
-        let mut found =
-            Argument { value, taught: None, posture: MeantPosture::Nearest, tool, points: Vec::new(), keeps: true };
+        let mut found = self.untaught(Value::Expression);
         let open = self.reader.at + 1;
         let Some(close) = self.reader.closing(open) else {
             self.reader.at = open;
             return Ok(found);
         };
-        if let Some([Some(x), near, _, _, tool]) = self.inverse_arguments(open, close) {
+        if let Some([Some(x), near, _, _, tool]) = self.places(&INVERSE, open, close) {
             self.reader.at = x;
             found.taught = self.taught();
             found.value = self.argument()?;
@@ -72,16 +78,36 @@ impl Script<'_> {
         points
     }
 
-    /// Where the arguments of `get_inverse_kin` begin; `None` for others than it has.
-    fn inverse_arguments(&mut self, open: usize, close: usize) -> Option<[Option<usize>; 5]> {
-        let mut found = [None; 5];
+    /// False where an arc may leave the orientation as it is to its path, whatever its targets say (`mode`).
+    pub(super) fn turns_as_told(&mut self, open: usize, close: usize) -> bool {
+        let start = self.reader.at;
+        let places = self.places(&ARC, open, close);
+        let is_told = match places {
+            Some([.., Some(mode)]) => {
+                self.reader.at = mode;
+                self.reader.take_number().is_some_and(|(mode, _)| mode == 0.0)
+            }
+            _ => true,
+        };
+        self.reader.at = start;
+        is_told
+    }
+
+    /// Where the arguments of a call with these parameters begin; `None` for others than it has.
+    fn places<const N: usize>(
+        &mut self,
+        parameters: &[&[u8]; N],
+        open: usize,
+        close: usize,
+    ) -> Option<[Option<usize>; N]> {
+        let mut found = [None; N];
         self.reader.at = open + 1;
         for k in 0.. {
             if self.reader.at >= close {
                 break;
             }
             let named = self.reader.ahead_is_mark(1, b'=').then(|| self.reader.word()).flatten();
-            let place = named.map_or(Some(k), |name| INVERSE.iter().position(|parameter| *parameter == name))?;
+            let place = named.map_or(Some(k), |name| parameters.iter().position(|parameter| *parameter == name))?;
             self.skip_argument_name();
             *found.get_mut(place)? = Some(self.reader.at);
             while self.reader.at < close && !self.reader.take_mark(b',') {

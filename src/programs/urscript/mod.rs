@@ -21,7 +21,7 @@ use super::scan::{Dialect, Reader, TokenKind};
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, exp_so3};
-use active::Active;
+use active::{Active, ToolIs};
 
 const DIALECT: Dialect =
     Dialect { comment: b'#', quotes: b"\"'", header: None, based_numbers: false, latin_letters: false };
@@ -78,6 +78,8 @@ struct Argument {
     points: Vec<DeclaredPoint>,
     /// False where the move may change the posture to one that the text does not tell.
     keeps: bool,
+    /// False where the tool may be turned otherwise than it says.
+    turns_as_told: bool,
 }
 
 /// Reads scripts; each file is a program of its own.
@@ -216,8 +218,8 @@ impl Script<'_> {
                 self.reader.at += 2;
                 let value = self.argument()?;
                 self.now.0.tool.set(match &value {
-                    Value::Pose(fields, _) => Some(pose_of(fields)),
-                    _ => None,
+                    Value::Pose(fields, _) => ToolIs::Known(pose_of(fields)),
+                    _ => ToolIs::Computed,
                 });
             } else if next == Some(TokenKind::Mark(b'='))
                 && self.reader.ahead(2).map(|t| t.kind) != Some(TokenKind::Mark(b'='))
@@ -241,7 +243,7 @@ impl Script<'_> {
         let before = self.now.clone();
         self.way.call(name, self.flow, &mut self.now);
         if self.reader.ahead_is_word(-1, "run") {
-            self.now = self.now.merged(&before, "");
+            self.now = self.now.merged(&before, "a thread sets it");
         }
     }
 
@@ -320,6 +322,7 @@ impl Script<'_> {
                 "close it",
             ));
         };
+        let turns_as_told = way != Way::Arc || self.turns_as_told(open, close);
         self.reader.at = open + 1;
         for k in 0..count {
             if self.reader.at >= close {
@@ -332,7 +335,7 @@ impl Script<'_> {
                 ));
             }
             let points = self.points_in_argument(close);
-            let argument = Argument { points, ..self.target_argument(way)? };
+            let argument = Argument { points, turns_as_told, ..self.target_argument(way)? };
             self.visit(&name, line, argument)?;
             // To the next argument.
             while self.reader.at < close && !self.reader.take_mark(b',') {
@@ -446,6 +449,10 @@ impl Script<'_> {
             let words = "a conveyor or an offset of the path moves the tool on top of it";
             return Err(Why::new(LeftReason::FrameUnknown, words));
         }
+        if !argument.turns_as_told {
+            let words = "on the arc the tool keeps its orientation, or may keep it, whatever its targets say (mode)";
+            return Err(Why::new(LeftReason::OrientationKept, words));
+        }
         let (kind, line) = match argument.value {
             Value::Joints(fields, line) => {
                 let mut by_reading = vec![None; self.setting.chain.readings.len()];
@@ -453,7 +460,7 @@ impl Script<'_> {
                 for (field, &reading) in fields.into_iter().zip(self.setting.axes) {
                     by_reading[reading] = Some(field);
                 }
-                let tool = StatedFrame::beside(&Pose::identity(), argument.tool.ok());
+                let tool = self.now.0.tool.value.beside_joints();
                 let frames = Box::new([tool, StatedFrame::Unsaid]);
                 (TargetKind::Joints(JointTarget { readings, fields: by_reading, frames }), line)
             }
@@ -474,8 +481,7 @@ impl Script<'_> {
 
     /// The tool that `set_tcp` has set.
     fn active_tool(&self) -> Understood<Pose> {
-        let words = "its tool is not known: no set_tcp(p[..]) with numbers before it; give --tool";
-        self.now.0.tool.value.ok_or_else(|| Why::new(LeftReason::ToolUnknown, words))
+        self.now.0.tool.value.known()
     }
 
     fn pose(&self, fields: [Field; 6], posture: MeantPosture, tool: Pose) -> PoseTarget {
