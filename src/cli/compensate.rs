@@ -92,24 +92,12 @@ pub(super) struct CompensateArgs {
         help_heading = "How the program is read"
     )]
     start: Vec<f64>,
-    /// Tool where the program sets none, in the notation of the language
-    #[arg(
-        long,
-        value_name = "NUMBERS",
-        value_delimiter = ',',
-        allow_hyphen_values = true,
-        help_heading = "How the program is read"
-    )]
-    tool: Vec<f64>,
-    /// Work frame where the program sets none, in the notation of the language (a move of RAPID without \WObj is in wobj0)
-    #[arg(
-        long,
-        value_name = "NUMBERS",
-        value_delimiter = ',',
-        allow_hyphen_values = true,
-        help_heading = "How the program is read"
-    )]
-    work: Vec<f64>,
+    /// Tool where the program sets none: its numbers in the order and the units of the language, separated by commas, or as the language writes it ({X 10,Y 0,..}, p[..], [[..],[..]])
+    #[arg(long, value_name = "FRAME", allow_hyphen_values = true, help_heading = "How the program is read")]
+    tool: Option<String>,
+    /// Work frame where the program sets none, likewise (a move of RAPID without \WObj is in wobj0)
+    #[arg(long, value_name = "FRAME", allow_hyphen_values = true, help_heading = "How the program is read")]
+    work: Option<String>,
     /// The robot does not visit the targets in the order of the text: backlash stays out of account
     #[arg(long, help_heading = "How the program is read")]
     unordered: bool,
@@ -144,17 +132,17 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
         }
     }
     let axes = axes(args, &controller.chain)?;
+    let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<_>>()?;
     let language = language(args)?;
     let setting = ProgramSetting {
         chain: &controller.chain,
         axes: &axes,
         rad_per_unit: args.joint_unit.map(|u| if u == Unit::Deg { 1f64.to_radians() } else { 1.0 }),
         base: stands_on(args, &urdf::read(nominal)?).map_or_else(Pose::identity, |(_, pose)| pose),
-        tool: frame("--tool", &args.tool, language)?,
-        work: frame("--work", &args.work, language)?,
+        tool: frame("--tool", args.tool.as_deref(), language)?,
+        work: frame("--work", args.work.as_deref(), language)?,
         axes_apart: args.axes_apart,
     };
-    let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<_>>()?;
     let mut program = programs::read(language, files, &setting)?;
     let needs_controller =
         |t: &&Target| matches!(&t.kind, TargetKind::Pose(p) if p.joint_fields.iter().all(Option::is_none));
@@ -286,6 +274,9 @@ fn language(args: &CompensateArgs) -> Result<Language> {
 
 fn text_file(path: &Path) -> Result<TextFile> {
     let bytes = files::read(path, files::FileKind::Program)?;
+    if let Some((what, remedy)) = programs::packed(&bytes) {
+        return Err(Error::new(Code::ProgramLanguage, path.display(), what, remedy));
+    }
     if bytes.contains(&0) {
         let what = "is not a text of single bytes (it holds zero bytes, as UTF-16 does)";
         return Err(Error::new(
@@ -360,13 +351,12 @@ fn postures(args: &CompensateArgs, chain: &Chain, axes: &[usize]) -> Result<Post
 }
 
 /// A frame on the command line, in the notation of the language.
-fn frame(flag: &str, numbers: &[f64], language: Language) -> Result<Option<Pose>> {
-    if numbers.is_empty() {
-        return Ok(None);
-    }
-    let bad =
-        |wanted| Error::new(Code::OptionRange, flag, format!("{} numbers", numbers.len()), format!("give {wanted}"));
-    language.frame(numbers).map(Some).map_err(bad)
+fn frame(flag: &str, text: Option<&str>, language: Language) -> Result<Option<Pose>> {
+    let bad = |text: &str, wanted| {
+        let what = format!("\"{text}\" is no frame of {}", language.words());
+        Error::new(Code::OptionRange, flag, what, format!("give {wanted}"))
+    };
+    text.map(|text| language.frame(text).map_err(|wanted| bad(text, wanted))).transpose()
 }
 
 /// Targets listed one by one on the terminal; more only by their largest corrections.

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::program::Program;
 use super::setting::ProgramSetting;
 use super::text_file::TextFile;
-use super::{krl, rapid, table, urscript};
+use super::{foreign, frame_text, krl, rapid, table, urscript};
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, exp_so3};
 
@@ -23,6 +23,8 @@ struct Row {
     frame: fn(&[f64]) -> Option<Pose>,
     /// These numbers in words.
     frame_numbers: &'static str,
+    /// The numbers of a frame in the brackets of this language.
+    in_brackets: fn(&str) -> Option<Vec<f64>>,
 }
 
 /// From rows to the enum and all that asks which language it is.
@@ -57,6 +59,7 @@ languages! {
             _ => None,
         },
         frame_numbers: "x_m,y_m,z_m,qx,qy,qz,qw",
+        in_brackets: |_| None,
     }
     /// KUKA KRL: .src and .dat.
     Krl {
@@ -70,7 +73,8 @@ languages! {
             }
             _ => None,
         },
-        frame_numbers: "X,Y,Z,A,B,C in mm and deg",
+        frame_numbers: "X,Y,Z,A,B,C in mm and deg, or {X ..,Y ..,Z ..,A ..,B ..,C ..}",
+        in_brackets: frame_text::krl,
     }
     /// ABB RAPID.
     Rapid {
@@ -82,7 +86,8 @@ languages! {
             [x, y, z, q1, q2, q3, q4] => Some(Pose::from_xyz_quaternion([x, y, z].map(|v| 1e-3 * v), [q2, q3, q4, q1])),
             _ => None,
         },
-        frame_numbers: "x,y,z,q1,q2,q3,q4 in mm, q1 the scalar part",
+        frame_numbers: "x,y,z,q1,q2,q3,q4 in mm, q1 the scalar part, or [[x,y,z],[q1,q2,q3,q4]]",
+        in_brackets: frame_text::rapid,
     }
     /// Universal Robots URScript.
     UrScript {
@@ -94,7 +99,8 @@ languages! {
             [x, y, z, rx, ry, rz] => Some(Pose::new(exp_so3(&[rx, ry, rz].into()), [x, y, z].into())),
             _ => None,
         },
-        frame_numbers: "x,y,z,rx,ry,rz in m and rad",
+        frame_numbers: "x,y,z,rx,ry,rz in m and rad, or p[x,y,z,rx,ry,rz]",
+        in_brackets: frame_text::urscript,
     }
 }
 
@@ -117,6 +123,11 @@ impl Language {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         let found = Self::ALL.iter().find(|l| l.row().extensions.contains(&extension.as_str()));
         found.copied().ok_or_else(|| {
+            if let Some(words) = foreign::program(&extension) {
+                let what = format!("is a program in {words}, by its extension, which compensate does not read");
+                let remedy = "write its targets to a table (.csv); or give --language where it is in another one";
+                return Error::new(Code::ProgramLanguage, path.display(), what, remedy);
+            }
             let known: Vec<&str> = Self::ALL.iter().flat_map(|l| l.row().extensions).copied().collect();
             let what = "its extension tells no language of programs";
             Error::new(
@@ -131,12 +142,14 @@ impl Language {
         })
     }
 
-    /// A frame in the notation of the language, from its numbers.
+    /// A frame as a user writes it: its numbers, separated by commas, or as it stands in the language.
     ///
     /// # Errors
-    /// Another count of numbers; the text says which are needed.
-    pub fn frame(self, numbers: &[f64]) -> std::result::Result<Pose, &'static str> {
-        (self.row().frame)(numbers).ok_or(self.row().frame_numbers)
+    /// Anything else; the text says what is needed.
+    pub fn frame(self, text: &str) -> std::result::Result<Pose, &'static str> {
+        let row = self.row();
+        let numbers = frame_text::list(text).or_else(|| (row.in_brackets)(text));
+        numbers.and_then(|numbers| (row.frame)(&numbers)).ok_or(row.frame_numbers)
     }
 }
 

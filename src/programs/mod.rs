@@ -14,7 +14,8 @@
 //! | `routines` | which routine a call means where several files have one of its name |
 //! | `names` | names that stand for something else in one module than in another |
 //! | `scan` | tokens that all languages share |
-//! | `language` | the table of languages |
+//! | `language`, `frame_text` | the table of languages, and how they write frames |
+//! | `foreign` | files that hold no program which is read |
 //! | `table`, `krl`, `rapid`, `urscript` | text -> targets |
 //!
 //! To add a language: a file that turns texts into a [`Program`], and a row of the table in `language`.
@@ -23,7 +24,9 @@ pub mod codes;
 pub mod compensate;
 pub mod field;
 mod flow;
+mod foreign;
 mod frame_candidates;
+mod frame_text;
 mod itinerary;
 mod krl;
 mod language;
@@ -43,6 +46,7 @@ mod text_file;
 mod urscript;
 
 pub use compensate::{Correction, Models, Postures, TargetOutcome, compensate};
+pub use foreign::packed;
 pub use frame_candidates::{MeasuredTool, SameFrames};
 pub use language::{Language, read};
 pub use measured_frames::{KnownError, MeasuredFrames, RobotFrames};

@@ -27,6 +27,7 @@ mod retarget;
 mod scopes;
 mod script_calls;
 mod several_frames;
+mod stated_frames;
 mod urscript;
 mod used;
 mod ways;
