@@ -306,6 +306,7 @@ fn a_handler_of_rapid_begins_with_all_that_its_routine_has_passed_through() {
             (format!("{shift}\n{step}\n{handler}\n{step}"), 1, vec![frame]),
             (format!("{shift}\n{step}\n{handler}\nPDispOff;\n{step}"), 2, vec![]),
             (format!("IF a THEN\n{shift}\nENDIF\n{step}\n{handler}\n{step}"), 1, vec![frame]),
+            (format!("IF a THEN\n{shift}\nRETURN;\nENDIF\n{step}\n{handler}\n{step}"), 1, vec![frame]),
             (format!("Shift;\n{step}\n{handler}\n{step}\nENDPROC\nPROC Shift()\n{shift}"), 1, vec![frame]),
             (format!("{step}\n{handler}\n{step}\nENDPROC\nPROC Shift()\n{shift}"), 2, vec![]),
             // Codes may count or not, and nothing tells the way.

@@ -59,9 +59,14 @@ impl<V: Either + Clone + PartialEq> Switch<V> {
         self.held.set(value);
     }
 
-    /// The same where any statement of the routine may have been the last one: it began with `top`.
+    /// Notes what another has passed through.
+    fn note(&mut self, other: &Self) {
+        self.passed = either(self.passed.as_ref(), other.passed.as_ref());
+    }
+
+    /// The same where any statement of the routine may have been the last one: it began with `top`, which has noted all that it passed through.
     fn anywhere(mut self, top: &Self) -> Self {
-        if let Some(passed) = &self.passed {
+        if let Some(passed) = &top.passed {
             self.held.set(self.value().either(passed).either(top.value()));
         }
         self
@@ -106,7 +111,14 @@ impl Switched {
         Self { watched: watched.map(Switch::new), displaced: Switch::new(displaced), offset: Switch::new(offset) }
     }
 
-    /// The same where any statement of the routine may have been the last one: it began with `top`.
+    /// Notes what another has passed through.
+    pub fn note(&mut self, other: &Self) {
+        self.watched.iter_mut().zip(&other.watched).for_each(|(own, other)| own.note(other));
+        self.displaced.note(&other.displaced);
+        self.offset.note(&other.offset);
+    }
+
+    /// The same where any statement of the routine may have been the last one: it began with `top`, which has noted all that it passed through.
     pub fn anywhere(self, top: &Self) -> Self {
         let [joints, paths] = self.watched;
         Self {

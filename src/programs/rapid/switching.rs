@@ -32,7 +32,7 @@ pub(super) struct Switching {
     /// The same of an offset of external axes.
     offsets: bool,
     now: Now,
-    /// What held where the routine began.
+    /// What held where the routine began, and what it has passed through since.
     top: Switched,
     flow: Flow<Now>,
 }
@@ -125,6 +125,7 @@ impl Switching {
             "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => self.branches_end(way),
             _ => self.step(word, way),
         }
+        self.top.note(&self.now.0);
     }
 
     /// All that the routines of the files may have switched.
@@ -152,6 +153,7 @@ impl Switching {
         let before = self.now.clone();
         self.step(word, way);
         self.now = self.now.merged(&before, "");
+        self.top.note(&self.now.0);
     }
 
     /// A statement without branches.
