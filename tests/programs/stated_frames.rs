@@ -125,7 +125,7 @@ fn a_script_says_whether_stating_the_tool_helps() {
     ] {
         let text = format!("def p():\n  movej({q:?})\n{before}  movel({pose})\nend\n");
         let file = cell.write("a.script", text.as_bytes());
-        for flags in [&["--unordered"][..], &["--unordered", "--tool=0,0,0.2,0,0,0"]] {
+        for flags in [&["--unordered"][..], &["--unordered", "--tool=0,0,0.02,0,0,0"]] {
             let run = cell.compensate(&[&file], flags);
             let is_left = !(helps && flags.len() > 1);
             assert_eq!(run.told().left.len(), usize::from(is_left), "{before} {flags:?}");
@@ -146,9 +146,9 @@ fn stated_frames_are_numbers_or_written_as_the_language_writes_them() {
     let module = format!("MODULE m\nPROC main()\nMoveJ {target},v1,z1,tX\\WObj:=wX;\nENDPROC\nENDMODULE\n");
     let script = format!("def p():\n  movej({q:?})\n  movel({})\nend\n", script_pose(&cell.nominal.base_from_tip(&q)));
     for (name, text, numbers, written, wrong) in [
-        ("a.src", &source, "1,-2,30,0,5,0", "{X 1, Y -2.0, Z 30, A 0, B 5, C 0}", "{X 1,Y -2,Z 30}"),
-        ("m.mod", &module, "1,-2,30,0.999048,0,0.043619,0", "[[1,-2.0,30], [0.999048,0,0.043619,0]]", "[[1,-2,30]]"),
-        ("p.script", &script, "0.01,-0.02,0.03,0,0.1,0", "p[0.01,-0.02,0.03, 0,0.1,0]", "[0.01,-0.02,0.03,0,0.1,0]"),
+        ("a.src", &source, "1,-2,30,0,1,0", "{X 1, Y -2.0, Z 30, A 0, B 1, C 0}", "{X 1,Y -2,Z 30}"),
+        ("m.mod", &module, "1,-2,30,0.999962,0,0.008727,0", "[[1,-2.0,30], [0.999962,0,0.008727,0]]", "[[1,-2,30]]"),
+        ("p.script", &script, "0.01,-0.02,0.03,0,0.02,0", "p[0.01,-0.02,0.03, 0,0.02,0]", "[0.01,-0.02,0.03,0,0.1,0]"),
     ] {
         let file = cell.write(name, text.as_bytes());
         let run = |frame: &str| cell.compensate(&[&file], &["--unordered", "--work", frame, "--tool", frame]);
