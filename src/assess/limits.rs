@@ -137,6 +137,12 @@ limits! {
     /// The same from which the measurements do not belong together: real trackers and sockets stay below 1.2.
     measurement_factor: f64 = 10.0;
 
+    /// Standard deviations between a measured distance and all else beyond which it takes no part, of a single one: sigmas are believed to a
+    /// factor of two, and robots err alike where the places are neighbours (real sockets: five).
+    distance_sigmas: f64 = 8.0;
+    /// The same of one that takes part, from which it is said.
+    distance_doubtful: f64 = 4.0;
+
     /// Standard deviations from which on plate and links contradict each other.
     plate_size_sigmas: f64 = 3.0;
     /// The same from which on it is said of a plate that nobody measured: by chance one in eighty.

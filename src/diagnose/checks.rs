@@ -3,9 +3,10 @@
 use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::{
-    camera_model, camera_pattern, exchanged_readings, extrapolates, few_images, focus, held_near_nominal, joint_noise,
-    left_out_bodies, left_out_images, left_out_observations, length_standard, loose, marker_off, measurement_scatter,
-    moved, no_gain, parameter_off, plate_size, pose_step, scatter, stated_noise, tag_size, undetermined, zeros_off,
+    camera_model, camera_pattern, contradicted_distances, exchanged_readings, extrapolates, few_images, focus,
+    held_near_nominal, joint_noise, left_out_bodies, left_out_images, left_out_observations, length_standard, loose,
+    marker_off, measurement_scatter, moved, no_gain, parameter_off, plate_size, pose_step, scatter, stated_noise,
+    tag_size, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -88,6 +89,7 @@ pub const CHECKS: &[Check] = &[
     check("no_gain", Stage::Fit(|a, b, s| found(no_gain::check(a, b, s)))),
     check("zeros_off", Stage::LeftOut(|a, s| found(zeros_off::check(a, s)))),
     check("plate_size", Stage::Fit(|a, b, s| found(plate_size::check(a, b, s)))),
+    check("contradicted_distances", Stage::Fit(|a, b, s| found(contradicted_distances::check(a, b, s)))),
     check("length_standard", Stage::Fit(|a, b, s| found(length_standard::check(a, b, s)))),
     check("marker_off", Stage::Fit(|a, b, s| found(marker_off::check(a, b, s)))),
     check("tag_size", Stage::Fit(|a, b, s| found(tag_size::check(a, b, s)))),

@@ -5,6 +5,7 @@ use std::fmt;
 use super::camera_model::CameraModelMisfit;
 use super::camera_pattern::ResidualPattern;
 use super::computed_postures::ComputedPostures;
+use super::contradicted_distances::ContradictedDistances;
 use super::displaced::Displaced;
 use super::exchanged_readings::ExchangedReadings;
 use super::extrapolates::Extrapolates;
@@ -64,6 +65,7 @@ macro_rules! findings {
 findings! {
     CameraModelMisfit,
     ComputedPostures,
+    ContradictedDistances,
     ContradictedLengths,
     Displaced,
     DoubtedSize,

@@ -43,7 +43,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Cont
 /// What measures lengths beside plates. Sockets alone measure none.
 fn standards(problem: &Problem) -> impl Iterator<Item = LengthStandard> {
     let instruments = problem.instruments.iter().enumerate().filter(|(_, i)| i.kind != InstrumentKind::Socket);
-    let distances = (!problem.lengths.is_empty()).then_some(LengthStandard::Distances);
+    let distances = problem.used_lengths().next().map(|_| LengthStandard::Distances);
     instruments.map(|(own, _)| LengthStandard::Instrument(own)).chain(distances)
 }
 

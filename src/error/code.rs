@@ -319,7 +319,7 @@ codes! {
         TargetDrifts "target_drifts" "a target or a ball creeps on the tip all through the series",
         ZeroMoved "zero_moved" "the zero of a joint is another from some stop on, or in one of several series",
         PlateSizeContradicted "plate_size_contradicted" "robot and plate file disagree on the size of the plate",
-        LengthsContradicted "lengths_contradicted" "what a tracker, given places or measured distances say contradicts the lengths of the robot's links",
+        LengthsContradicted "lengths_contradicted" "what a tracker, given places or measured distances say contradicts the lengths of the robot's links and all else",
         PlateUneven "plate_uneven" "the plate is stretched more one way than the other",
         MeasurementsLeftOut "measurements_left_out" "measurements of trackers or contacts do not fit the others, and are left out",
         MeasurementsScatter "measurements_scatter" "measurements of a tracker or of contacts scatter more than their stated sigma says",

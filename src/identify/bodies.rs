@@ -48,7 +48,9 @@ impl Bodies {
                     rejected: None,
                 });
             }
-            all.lengths.extend(s.lengths.iter().filter_map(|l| all.length(l)).collect::<Vec<_>>());
+            all.lengths.extend(
+                s.lengths.iter().enumerate().filter_map(|(k, l)| all.length(l, (index, k))).collect::<Vec<_>>(),
+            );
         }
         all.measurements.sort_by_key(|m| m.stop);
         all
@@ -62,13 +64,14 @@ impl Bodies {
         })
     }
 
-    /// By names of instruments, else of bodies.
-    fn length(&self, length: &SeenLength) -> Option<MeasuredLength> {
+    /// By names of instruments, else of bodies, with where it was read.
+    fn length(&self, length: &SeenLength, read: (usize, usize)) -> Option<MeasuredLength> {
         let pair = |of: &dyn Fn(&String) -> Option<usize>| Some([of(&length.between[0])?, of(&length.between[1])?]);
         let instruments = pair(&|name| self.instruments.iter().position(|i| &i.name == name));
         let bodies = || pair(&|name| self.names.iter().position(|n| n == name));
         let ends = instruments.map(LengthEnds::Instruments).or_else(|| bodies().map(LengthEnds::Bodies))?;
-        Some(MeasuredLength { ends, distance_m: length.distance_m, sigma_m: length.sigma_m })
+        let SeenLength { distance_m, sigma_m, .. } = *length;
+        Some(MeasuredLength { ends, distance_m, sigma_m, read, left_out: false })
     }
 
     /// Holds turns that nothing sees: of bodies that are seen as points only, and of frames that are parallel to the base.

@@ -4,6 +4,7 @@ use super::bodies_start::start_bodies;
 use super::build::build;
 use super::estimator::Estimator;
 use super::free_poses::{FreeStart, adjust_free_poses};
+use super::measured_lengths::{leave_all_out, leave_worst_out, take_agreeing};
 use super::options::{JointNoise, MarkerTolerance, Options};
 use super::solution::Solution;
 use super::staged::{refit, staged};
@@ -12,7 +13,7 @@ use super::start_verdict::StartVerdict;
 use super::stated::camera_starts;
 use super::two_stage::PoseStage;
 use super::unpredicted::nothing_held_out;
-use crate::assess::{hold_out, hold_out_bodies, judge, refitted_near};
+use crate::assess::{Limits, hold_out, hold_out_bodies, judge, refitted_near};
 use crate::diagnose::{CheckContext, Diagnosis, StatedNoise};
 use crate::error::{Code, Error, Result};
 use crate::fit::{Fit, FreePoses};
@@ -109,7 +110,7 @@ pub(super) fn fit_model(
             Code::NotConverged,
             "joint fit",
             format!("ended without converging ({status:?})"),
-            "look at the per-image table for images that do not belong, and at the starting values",
+            not_converged(&outcome.adjustment.problem),
         ));
     }
     let fit = outcome.fit().map_err(|e| {
@@ -216,6 +217,7 @@ fn fit(
     if let JointNoise::Known(sigma) = options.joint_noise {
         start.problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
     }
+    leave_all_out(&mut start.problem);
     let components =
         ComponentOptions { joint: options.joint_noise == JointNoise::Estimated, ..ComponentOptions::default() };
     let mut outcome = match near {
@@ -228,15 +230,26 @@ fn fit(
         }
         outcome = estimate_components(outcome.adjustment, &components);
     }
+    outcome = without_contradicting(outcome, &components, &options.limits);
+    if take_agreeing(&mut outcome, &options.limits) {
+        outcome = estimate_components(outcome.adjustment, &components);
+        outcome = without_contradicting(outcome, &components, &options.limits);
+    }
+    if components.joint { without_unidentified_noise(outcome, &components.settings) } else { (outcome, None) }
+}
+
+/// Leaves out what disagrees with all else, as long as something does.
+fn without_contradicting(mut outcome: Outcome, components: &ComponentOptions, limits: &Limits) -> Outcome {
     for _ in 0..ROUNDS {
         let stops = reject_stops(&mut outcome.adjustment) || reject_contradicting(&mut outcome.adjustment).is_some();
         let of_images = if stops { 0 } else { reject_observations(&mut outcome.adjustment) };
-        if !stops && of_images + reject_bodies(&mut outcome.adjustment) == 0 {
+        let anything = stops || of_images + reject_bodies(&mut outcome.adjustment) > 0;
+        if !anything && !leave_worst_out(&mut outcome, limits) {
             break;
         }
-        outcome = estimate_components(outcome.adjustment, &components);
+        outcome = estimate_components(outcome.adjustment, components);
     }
-    if components.joint { without_unidentified_noise(outcome, &components.settings) } else { (outcome, None) }
+    outcome
 }
 
 /// Adds to every wrongly paired image by how much its readings miss, and whose readings would fit it.
@@ -260,6 +273,14 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f6
     for (i, mismatch) in remarks {
         adjustment.problem.images[i].rejected = Some(ImageRejection::WronglyPaired(mismatch));
     }
+}
+
+/// What may keep a fit from its end.
+fn not_converged(problem: &Problem) -> &'static str {
+    if problem.images.is_empty() {
+        return "look for rows of other stops, and at the units of the readings and of what was measured";
+    }
+    "look at the per-image table for images that do not belong, and at the starting values"
 }
 
 /// A two-step calibration goes by camera poses.

@@ -23,6 +23,7 @@ mod joint;
 mod lens_choice;
 mod local_errors;
 mod measure;
+mod measured_lengths;
 mod misread;
 mod mistakes;
 mod near_nominal;

@@ -86,6 +86,9 @@ pub struct LengthRecord {
     pub sigma_m: f64,
     /// As fitted, m.
     pub fitted_m: Option<f64>,
+    /// True where it took no part in the fit, which contradicts it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub left_out: bool,
 }
 
 /// A stop of a series without images.
@@ -133,7 +136,7 @@ impl BodiesRecord {
                 .enumerate()
                 .map(|(k, m)| measurement(solution, k, m))
                 .collect(),
-            lengths: solution.series.iter().flat_map(|s| s.lengths.iter().map(|l| length(solution, s, l))).collect(),
+            lengths: (0..solution.series.len()).flat_map(|s| lengths(solution, s)).collect(),
             stops: stops.collect(),
         }
     }
@@ -222,7 +225,13 @@ fn measurement(solution: &Solution, k: usize, m: &BodyMeasurement) -> Measuremen
     }
 }
 
-fn length(solution: &Solution, series: &MeasuredSeries, l: &SeenLength) -> LengthRecord {
+fn lengths(solution: &Solution, index: usize) -> Vec<LengthRecord> {
+    let series = &solution.series[index];
+    let is_out = |k: usize| solution.fit.problem.lengths.iter().any(|l| l.left_out && l.read == (index, k));
+    series.lengths.iter().enumerate().map(|(k, l)| length(solution, series, l, is_out(k))).collect()
+}
+
+fn length(solution: &Solution, series: &MeasuredSeries, l: &SeenLength, left_out: bool) -> LengthRecord {
     let (problem, state) = (&solution.fit.problem, &solution.fit.state);
     let place = |name: &String| {
         let instrument =
@@ -236,6 +245,7 @@ fn length(solution: &Solution, series: &MeasuredSeries, l: &SeenLength) -> Lengt
         distance_m: l.distance_m,
         sigma_m: l.sigma_m,
         fitted_m: a.zip(b).map(|(a, b)| (b - a).norm()),
+        left_out,
     }
 }
 

@@ -196,6 +196,11 @@ impl Problem {
         self.body_measurements.iter().enumerate().filter(|(_, measured)| measured.rejected.is_none())
     }
 
+    /// Measured distances between places or bodies that take part, with their indices.
+    pub fn used_lengths(&self) -> impl Iterator<Item = (usize, &MeasuredLength)> {
+        self.lengths.iter().enumerate().filter(|(_, length)| !length.left_out)
+    }
+
     /// Stops at which something in use was measured, ascending.
     pub fn used_stops(&self) -> Vec<usize> {
         let of_bodies = self.used_bodies().map(|(_, measured)| measured.stop);

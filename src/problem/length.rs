@@ -23,6 +23,10 @@ pub struct MeasuredLength {
     pub distance_m: f64,
     /// Its sigma, m.
     pub sigma_m: f64,
+    /// Its series, and its place among the distances of that.
+    pub read: (usize, usize),
+    /// True where it takes no part: all else contradicts it.
+    pub left_out: bool,
 }
 
 /// A measured distance over its sigma, linearised.

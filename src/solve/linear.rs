@@ -229,7 +229,8 @@ impl Adjustment {
         let of_bodies: f64 = bodies.iter().map(|b| b.terms.cost).sum();
         let stops = self.stops_of(images, bodies);
         let distances = self.distances(images, terms);
-        let lengths: Vec<Length> = problem.lengths.iter().filter_map(|l| l.linearise(&problem.layout, state)).collect();
+        let lengths: Vec<Length> =
+            problem.used_lengths().filter_map(|(_, l)| l.linearise(&problem.layout, state)).collect();
         let residuals = distances.iter().map(|d| d.residual).chain(lengths.iter().map(|l| l.residual));
         let measured: f64 = residuals.map(|r| 0.5 * r * r).sum();
         let cost = pixels + of_bodies + self.prior_cost(images, &stops) + measured;

@@ -7,7 +7,7 @@ use super::linear::{BodyPart, LinearProblem};
 use super::right_hand_sides::RightHandSides;
 use super::seen_markers::SeenMarkers;
 use super::system::System;
-use crate::problem::Step;
+use crate::problem::{MeasuredLength, Step};
 
 /// What measures lengths, beside plates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,11 +69,12 @@ impl LinearProblem<'_> {
 
     /// The same of every measured distance, over its sigma.
     fn stretched_lengths(self, standard: LengthStandard) -> Vec<f64> {
-        let (problem, lengths) = (&self.adjustment.problem, &self.lin.lengths);
-        if standard != LengthStandard::Distances || problem.lengths.len() != lengths.len() {
+        let (measured, lengths) = (self.adjustment.problem.used_lengths(), &self.lin.lengths);
+        let measured: Vec<&MeasuredLength> = measured.map(|(_, l)| l).collect();
+        if standard != LengthStandard::Distances || measured.len() != lengths.len() {
             return vec![0.0; lengths.len()];
         }
-        problem.lengths.iter().zip(lengths).map(|(m, l)| m.distance_m / m.sigma_m - l.residual).collect()
+        measured.into_iter().zip(lengths).map(|(m, l)| m.distance_m / m.sigma_m - l.residual).collect()
     }
 
     /// How a step moves what is predicted of a measured body, as a body twist.

@@ -30,5 +30,6 @@ mod real_tracker;
 mod refits;
 mod second_pass;
 mod solver_laws;
+mod stated_lengths;
 mod two_stage;
 mod zeros;

@@ -53,6 +53,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("diagnose/joint_noise.rs MOST_IMAGES", "how many are named"),
     ("diagnose/left_out_bodies.rs MOST_NAMED", "words"),
     ("diagnose/left_out_images.rs MOST_IMAGES", "how many are named"),
+    ("diagnose/contradicted_distances.rs MOST_NAMED", "how many are named"),
     ("diagnose/length_standard.rs FOUND", "convergence"),
     ("diagnose/length_standard.rs ROUNDS", "most iterations"),
     ("diagnose/loose.rs MOST_IMAGES", "how many are named"),

@@ -34,7 +34,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
             div.wide { table {
                 thead { tr { th { "Measured distance" } th.n { "measured, mm" } th.n { "sigma, mm" } th.n { "fitted, mm" } } }
                 tbody { @for l in &b.lengths { tr {
-                    td { (l.between[0]) " to " (l.between[1]) } td.n { (format!("{:.3}", 1e3 * l.distance_m)) }
+                    td { (l.between[0]) " to " (l.between[1]) @if l.left_out { " (left out)" } } td.n { (format!("{:.3}", 1e3 * l.distance_m)) }
                     td.n { (significant(1e3 * l.sigma_m)) }
                     td.n { (l.fitted_m.map_or_else(String::new, |m| format!("{:.3}", 1e3 * m))) }
                 } } }
