@@ -21,6 +21,8 @@ pub enum Carried {
     Instrument,
     /// What a tracker or a socket sees of the tip.
     Target,
+    /// What holds all targets on the tip.
+    Bracket,
 }
 
 /// In which images it stands elsewhere.
@@ -78,7 +80,7 @@ impl Displaced {
 
     /// True where a tracker or contacts show it, not images.
     pub(super) fn is_measured(&self) -> bool {
-        matches!(self.body, Carried::Instrument | Carried::Target)
+        matches!(self.body, Carried::Instrument | Carried::Target | Carried::Bracket)
     }
 
     /// The first image in which it stands elsewhere.
@@ -94,6 +96,7 @@ impl Displaced {
             Carried::Camera => "camera on its stand",
             Carried::Instrument => "tracker",
             Carried::Target => "target on the tip",
+            Carried::Bracket => "bracket of all targets on the tip",
         }
     }
 }
@@ -109,7 +112,7 @@ impl Kind for Displaced {
             Carried::Plate | Carried::PlateInHand => of(Code::PlateDisplaced, Code::PlateDrifts, Code::PlateLoose),
             Carried::Camera | Carried::CameraInHand => of(Code::CameraDisplaced, Code::CameraDrifts, Code::CameraLoose),
             Carried::Instrument => of(Code::TrackerDisplaced, Code::TrackerDrifts, Code::TrackerDisplaced),
-            Carried::Target => of(Code::TargetDisplaced, Code::TargetDrifts, Code::TargetDisplaced),
+            Carried::Target | Carried::Bracket => of(Code::TargetDisplaced, Code::TargetDrifts, Code::TargetDisplaced),
         }
     }
 
@@ -152,7 +155,7 @@ impl Kind for Displaced {
             Displacement::FromThenOn => {
                 let stands = match self.body {
                     Carried::Plate | Carried::Camera | Carried::Instrument => "stands",
-                    Carried::PlateInHand | Carried::CameraInHand | Carried::Target => "sits",
+                    Carried::PlateInHand | Carried::CameraInHand | Carried::Target | Carried::Bracket => "sits",
                 };
                 let touched = if self.is_camera() { ", creeps, or its lens was touched" } else { ", or creeps" };
                 format!(
@@ -198,6 +201,10 @@ impl Kind for Displaced {
                     "give the target another name from {} on (of contacts, put them into a series of their own), or fasten it and measure again",
                     self.first()
                 ),
+                Carried::Bracket => format!(
+                    "give all targets other names from {} on, or fasten their bracket and measure again",
+                    self.first()
+                ),
             },
             Displacement::InAll => match self.body {
                 Carried::Camera | Carried::CameraInHand => {
@@ -210,6 +217,7 @@ impl Kind for Displaced {
                     format!("write another name under [tracker] in the series.toml of {}", self.series)
                 }
                 Carried::Target => format!("give the target another name in {}", self.series),
+                Carried::Bracket => format!("give all targets other names in {}", self.series),
             },
             Displacement::AxisUp(_) => "fasten it, and take the series again".into(),
             Displacement::AllThrough => {

@@ -13,6 +13,9 @@
 //! has a beta distribution where noise is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them:
 //! the step must also explain most of `R`; one that explains less, but much, is a doubt.
 //!
+//! Several targets on the tip may be held by one bracket: its twist `x` about their middle moves each of them, `A = sum_k T_k B_k`, with the columns
+//! `T_k` of a target and `B_k = [R' , -R' [d]; 0, R']` of its rotation `R` in the tip and its place `d` from the middle.
+//!
 //! Another focal length looks like a camera that moved along its axis, as far as all images are taken from one distance: where a step of it falls by
 //! more than that of plate or camera, it is named instead.
 
@@ -112,7 +115,7 @@ impl Squares {
         let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
         let of_poses = share(self.poses[group], after.poses[group]);
         let of_part = match step.changed {
-            Changed::Instrument(_) | Changed::Target(_) => {
+            Changed::Instrument(_) | Changed::Target(_) | Changed::Bracket => {
                 let parts = self.bodies.iter().zip(&after.bodies);
                 parts.map(|(before, after)| share(before[group], after[group])).fold(0.0, f64::max)
             }
@@ -214,9 +217,10 @@ fn refocused(
 fn carried(changed: Changed, first: Shown, problem: &Problem) -> Option<(Carried, String)> {
     Some(match (changed, first) {
         (Changed::Instrument(i), _) => (Carried::Instrument, problem.instruments[i].name.clone()),
-        (Changed::Target(_), Shown::Measurement(k)) => {
+        (Changed::Target(_) | Changed::Bracket, Shown::Measurement(k)) => {
             let measured = &problem.body_measurements[k];
-            (Carried::Target, problem.instruments[measured.instrument].name.clone())
+            let body = if changed == Changed::Bracket { Carried::Bracket } else { Carried::Target };
+            (body, problem.instruments[measured.instrument].name.clone())
         }
         (Changed::Placement(_) | Changed::Mounting(_), Shown::Image { index, .. }) => {
             let image = &problem.images[index];

@@ -3,7 +3,9 @@
 use std::ops::Range;
 use std::rc::Rc;
 
-use crate::problem::{Layout, Problem};
+use nalgebra::{DMatrix, Vector3};
+
+use crate::problem::{Adjustment, BodyMeasurement, InstrumentKind, Layout, Problem};
 
 /// What may be another from some stop on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,6 +18,8 @@ pub(super) enum Changed {
     Instrument(usize),
     /// A body on the tip.
     Target(usize),
+    /// All targets on the tip together: what holds them.
+    Bracket,
     /// The zero of a reading.
     Zero(usize),
     /// The focal lengths of a camera.
@@ -33,10 +37,42 @@ impl Changed {
             Self::Mounting(m) => layout.mountings[m].clone(),
             Self::Instrument(i) => told(&layout.instruments[i]),
             Self::Target(b) => told(&layout.bodies[b]),
+            // No columns of its own: it moves those of all targets.
+            Self::Bracket => 0..0,
             Self::Zero(reading) => zeros[reading].map_or(0..0, |c| c..c + 1),
             Self::Focal(c) => layout.cameras[c].start..layout.cameras[c].start + 2,
         }
     }
+}
+
+fn is_by_tracker(problem: &Problem, measured: &BodyMeasurement) -> bool {
+    problem.instruments[measured.instrument].kind == InstrumentKind::Tracker
+}
+
+/// By how much a twist of all targets together moves the columns of each: about their middle, along the axes of the tip. None of a single one.
+pub(super) fn bracket(Adjustment { problem, state }: &Adjustment) -> DMatrix<f64> {
+    let seen = |b: &usize| problem.used_bodies().any(|(_, m)| m.body == *b && is_by_tracker(problem, m));
+    let targets: Vec<usize> = (0..state.bodies.len()).filter(seen).collect();
+    let columns = problem.layout.len();
+    if targets.len() < 2 {
+        return DMatrix::zeros(columns, 0);
+    }
+    let middle = targets.iter().map(|b| state.bodies[*b].translation).sum::<Vector3<f64>>() / targets.len() as f64;
+    let mut all = DMatrix::zeros(columns, 6);
+    for body in targets {
+        let pose = &state.bodies[body];
+        let turn = pose.rotation.transpose();
+        let by_turn = turn * -(pose.translation - middle).cross_matrix();
+        for (k, column) in Changed::Target(body).columns(&problem.layout, &[]).enumerate() {
+            for axis in 0..3 {
+                let (shift, angle) =
+                    if k < 3 { (turn[(k, axis)], by_turn[(k, axis)]) } else { (0.0, turn[(k - 3, axis)]) };
+                all[(column, axis)] = shift;
+                all[(column, 3 + axis)] = angle;
+            }
+        }
+    }
+    all
 }
 
 /// How the stops are divided.
@@ -82,6 +118,7 @@ impl Shown {
             (Self::Image { index, .. }, Changed::Focal(c)) => problem.images[index].camera == c,
             (Self::Measurement(k), Changed::Instrument(i)) => problem.body_measurements[k].instrument == i,
             (Self::Measurement(k), Changed::Target(b)) => problem.body_measurements[k].body == b,
+            (Self::Measurement(k), Changed::Bracket) => is_by_tracker(problem, &problem.body_measurements[k]),
             _ => false,
         }
     }

@@ -16,7 +16,7 @@ impl Linear {
     /// Those by one change.
     fn divisions(&self, problem: &Problem, changed: Changed, fewest: usize) -> Vec<Candidate> {
         let mut all = Vec::new();
-        if changed.columns(&problem.layout, &self.zeros).is_empty() {
+        if self.parameters(problem, changed) == 0 {
             return all;
         }
         let telling = |r: &usize| self.rows[*r].of(problem, changed).next().is_some();
@@ -77,7 +77,8 @@ impl Linear {
         let framed = (0..problem.instruments.len()).filter(|i| problem.instruments[*i].kind != InstrumentKind::Socket);
         let targets = (0..problem.layout.bodies.len()).map(Changed::Target);
         let zeros = (0..self.zeros.len()).map(Changed::Zero);
-        placements.chain(mountings).chain(framed.map(Changed::Instrument)).chain(targets).chain(zeros).collect()
+        let carried = targets.chain([Changed::Bracket]);
+        placements.chain(mountings).chain(framed.map(Changed::Instrument)).chain(carried).chain(zeros).collect()
     }
 
     /// True for what the robot carries before a camera, or a camera that it carries: its weight may move it.

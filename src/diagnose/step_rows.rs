@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::step_candidates::{Candidate, Changed, Order, Shown};
+use super::step_candidates::{Candidate, Changed, Order, Shown, bracket};
 use crate::assess::{RootInformation, StopInformation, log_chance};
 use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
 use crate::model::joint_terms::Term;
@@ -112,6 +112,8 @@ pub(super) struct Linear {
     information: DMatrix<f64>,
     /// Columns of the zeros of readings.
     pub(super) zeros: Vec<Option<usize>>,
+    /// The columns that all targets together move, and by how much.
+    bracket: Rc<DMatrix<f64>>,
 }
 
 impl Linear {
@@ -145,7 +147,25 @@ impl Linear {
             Some(problem.layout.terms.start + term)
         };
         let zeros = (0..robot.chain.readings.len()).map(zero).collect();
-        Self { rows: all.into_iter().filter_map(row).collect(), information, zeros }
+        let bracket = Rc::new(bracket(linear.adjustment));
+        Self { rows: all.into_iter().filter_map(row).collect(), information, zeros, bracket }
+    }
+
+    /// How many parameters a change has.
+    pub(super) fn parameters(&self, problem: &Problem, changed: Changed) -> usize {
+        match changed {
+            Changed::Bracket => self.bracket.ncols(),
+            _ => changed.columns(&problem.layout, &self.zeros).len(),
+        }
+    }
+
+    /// Derivatives of a row by a change.
+    fn by(&self, row: usize, problem: &Problem, changed: Changed) -> DMatrix<f64> {
+        let row = &self.rows[row];
+        match changed {
+            Changed::Bracket => product(&row.by_columns, &self.bracket),
+            _ => row.by(&changed.columns(&problem.layout, &self.zeros)),
+        }
     }
 
     /// Squares `R` of what the poses that were seen miss of the readings, by the index of the noise.
@@ -252,14 +272,17 @@ impl Linear {
         let mut sums = Sums::new(self.columns(), 0);
         let mut before: Option<&Candidate> = None;
         for candidate in tried {
-            let columns = candidate.changed.columns(&problem.layout, &self.zeros);
+            let changed = candidate.changed;
+            let add = |sums: &mut Sums, r: usize, part: f64| {
+                sums.add(&self.rows[r], &(self.by(r, problem, changed) * part));
+            };
             // Behind a step are the rows behind the one before it, and those between both.
             if let Some(last) = before.filter(|b| Rc::ptr_eq(&b.rows, &candidate.rows) && b.from > candidate.from) {
                 let between = &candidate.rows[candidate.from..last.from];
-                between.iter().for_each(|r| sums.add(&self.rows[*r], &columns, 1.0));
+                between.iter().for_each(|r| add(&mut sums, *r, 1.0));
             } else {
-                sums = Sums::new(self.columns(), columns.len());
-                candidate.moved().for_each(|(r, part)| sums.add(&self.rows[r], &columns, part));
+                sums = Sums::new(self.columns(), self.parameters(problem, changed));
+                candidate.moved().for_each(|(r, part)| add(&mut sums, r, part));
             }
             before = Some(candidate);
             let Some(fall) = sums.fall(covariance).filter(|fall| fall.told > 0) else { continue };
@@ -273,15 +296,14 @@ impl Linear {
 
     /// With the change as more columns, at the optimum; and the way there.
     pub(super) fn with(&self, problem: &Problem, step: &Step) -> Option<(Self, DVector<f64>)> {
-        let columns = step.changed.columns(&problem.layout, &self.zeros);
-        let (n, more) = (self.columns(), columns.len());
+        let (n, more) = (self.columns(), self.parameters(problem, step.changed));
         let mut information = self.information.clone().resize(n + more, n + more, 0.0);
         let mut gradient = DVector::zeros(n + more);
         let mut derivatives = Vec::with_capacity(self.rows.len());
         for (r, row) in self.rows.iter().enumerate() {
             let mut by_free = row.by_free.clone().resize_horizontally(n + more, 0.0);
             if let Some((_, part)) = step.moved.iter().find(|(moved, _)| *moved == r) {
-                let own = row.by(&columns) * *part;
+                let own = self.by(r, problem, step.changed) * *part;
                 by_free.columns_mut(n, more).copy_from(&own);
                 let coupling = by_free.tr_mul(&own);
                 let mut right = information.columns_mut(n, more);
@@ -305,7 +327,7 @@ impl Linear {
                 by_columns: row.by_columns.clone(),
             })
             .collect();
-        Some((Self { rows, information, zeros: self.zeros.clone() }, step))
+        Some((Self { rows, information, zeros: self.zeros.clone(), bracket: self.bracket.clone() }, step))
     }
 }
 
@@ -337,8 +359,7 @@ impl Sums {
         }
     }
 
-    fn add(&mut self, row: &Row, columns: &Range<usize>, part: f64) {
-        let by = &(row.by(columns) * part);
+    fn add(&mut self, row: &Row, by: &DMatrix<f64>) {
         self.score += by.tr_mul(&row.score);
         self.own += by.tr_mul(by);
         self.coupling += row.by_free.tr_mul(by);
