@@ -240,7 +240,9 @@ fn joint_noise(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
             format!(", spin {spin:.3}, shift across the optical axis {across:.3} mm, along it {along:.3} mm")
         });
         let displaced = [tilt, shift].map(Option::unwrap_or_default).concat();
-        writeln!(out, "joints    noise in mrad (95 %){of}: {}{displaced}", parts.join(", "))?;
+        let slides = r.robot.reading_kinds.contains(&JointKind::Prismatic);
+        let unit = if slides { "mrad, where a joint slides in mm" } else { "mrad" };
+        writeln!(out, "joints    noise in {unit} (95 %){of}: {}{displaced}", parts.join(", "))?;
     }
     Ok(())
 }

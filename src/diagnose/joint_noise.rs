@@ -6,6 +6,7 @@ use crate::assess::{Accuracy, median};
 use crate::error::Code;
 use crate::fit::Fit;
 use crate::problem::Problem;
+use crate::urdf::JointKind;
 
 /// Most images that are named.
 const MOST_IMAGES: usize = 4;
@@ -24,8 +25,10 @@ pub struct ImageValue {
 pub struct JointNoiseLarge {
     /// Series.
     pub series: String,
-    /// Joint with the largest noise.
+    /// Joint with the largest noise, a milliradian beside a millimetre: robots and rails repeat to a tenth of either.
     pub joint: String,
+    /// How it moves.
+    pub kind: JointKind,
     /// Its noise, rad or m.
     pub sigma: f64,
     /// Images that the others predict far worse than usual, mm.
@@ -46,6 +49,7 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
     let limits = setting.limits;
     let of_series = |(k, of): (usize, &crate::problem::MeasuredSeries)| {
         let (reading, joint, sigma) = noisiest_joint(setting.with_noise_found(fit), k)?;
+        let kind = fit.state.robot.chain.reading_kinds[reading];
         let readings_are_computed = of.readings_are_computed();
         let weight = match sigma {
             s if s > limits.joint_noise => Weight::Gate,
@@ -63,6 +67,7 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
         Some(JointNoiseLarge {
             series: of.name.clone(),
             joint: joint.to_owned(),
+            kind,
             sigma,
             worst_predicted: standing_out(problem, k, errors, limits.times_usual_error),
             badly_seen: standing_out(problem, k, sigma_px, limits.times_usual_blur),
@@ -121,7 +126,7 @@ impl Kind for JointNoiseLarge {
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        vec![Quantity::new("joint_noise", self.sigma, "rad or m")]
+        vec![Quantity::new("joint_noise", self.sigma, self.kind.units()[0])]
     }
 
     fn place(&self) -> String {
@@ -129,11 +134,13 @@ impl Kind for JointNoiseLarge {
     }
 
     fn seen(&self) -> String {
+        let unit = self.kind.units()[1];
         let still = self.stands_still.as_ref().map_or_else(String::new, |still| format!(", which reads {still}"));
         format!(
-            "the joint noise is {:.2} mrad ({} most{still}), where robots repeat to some 0.1 mrad{}{}",
+            "the joint noise is {:.2} {unit} ({} most{still}), where {} repeat to some 0.1 {unit}{}{}",
             1e3 * self.sigma,
             self.joint,
+            if self.kind == JointKind::Prismatic { "rails" } else { "robots" },
             in_words(", the others predict worst", &self.worst_predicted, |mm| format!("{mm:.1} mm")),
             in_words(", blurred or badly seen", &self.badly_seen, |px| format!("sigma {px:.3} px"))
         )
@@ -147,6 +154,9 @@ impl Kind for JointNoiseLarge {
             }
             Weight::Gate if self.stands_still.is_some() => {
                 "see whether that joint was read at these stops: correct their readings, or leave their rows out"
+            }
+            Weight::Note if !self.by_images => {
+                "did the tracker, its targets or the sockets move, was anything measured before the arm stood still, are readings rounded, is the robot model too small? the stated sigmas contain it"
             }
             Weight::Note => {
                 "did plate or camera move, were images taken before the arm stood still, are readings rounded, is autofocus or a stabiliser on? the stated sigmas contain it"

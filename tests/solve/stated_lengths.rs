@@ -1,12 +1,13 @@
-//! Stated distances that contradict all else: simulated robots with known truth.
+//! Stated distances that contradict all else, and several targets on one bracket: simulated robots with known truth.
 
 use nalgebra::Vector3;
-use robotcal::diagnose::{ContradictedDistances, Finding};
+use robotcal::diagnose::{Carried, ContradictedDistances, Displaced, Finding, JointNoiseLarge, Weight};
 use robotcal::error::Code;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, Solution, identify};
 use robotcal::model::robot::Robot;
 use robotcal::problem::{BodySeen, MeasuredSeries, SeenBody, SeenLength};
+use robotcal::urdf::JointKind;
 
 use crate::measured_worlds::{Kind, World};
 use crate::support::small::Dice;
@@ -114,4 +115,40 @@ fn wrong_distances_between_sockets_are_named_and_the_others_take_part() {
     let said = contradicted(&solved(&world, all));
     let [found] = &said[..] else { panic!("{said:?}") };
     assert_eq!((found.distances.len(), found.unit.map(|u| u.name)), (3, Some("millimetres")));
+}
+
+#[test]
+fn several_targets_that_slip_together_are_named_as_one() {
+    let world = of_poses(53);
+    let said = |moved: Pose| {
+        let solution = solved(&world, three_targets(&world, 18, &moved));
+        let displaced = |f| if let Finding::Displaced(found) = f { Some(found) } else { None };
+        solution.findings.into_iter().filter(Finding::fails).filter_map(displaced).collect::<Vec<Displaced>>()
+    };
+    assert_eq!(said(Pose::identity()), []);
+    for size in [1e-3, 2e-3] {
+        let all = said(Pose::from_xyz_rpy([0.8 * size, -0.6 * size, 0.0], [0.0; 3]));
+        let [found] = &all[..] else { panic!("{all:?}") };
+        assert_eq!((found.body, found.images[0].as_str()), (Carried::Bracket, "018"));
+        assert!((found.distance_m.0 - size).abs() < 0.1 * size, "{found:?}");
+    }
+}
+
+#[test]
+fn the_noise_of_a_rail_is_a_length() {
+    for (kind, unit) in [(JointKind::Prismatic, "m"), (JointKind::Revolute, "rad")] {
+        let noise = JointNoiseLarge {
+            series: "run".into(),
+            joint: "first".into(),
+            kind,
+            sigma: 2.7e-3,
+            worst_predicted: Vec::new(),
+            badly_seen: Vec::new(),
+            stands_still: None,
+            by_images: false,
+            readings_are_computed: false,
+            weight: Weight::Gate,
+        };
+        assert_eq!(Finding::from(noise).quantities()[0].unit, unit);
+    }
 }
