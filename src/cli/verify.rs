@@ -59,6 +59,7 @@ impl Judged {
 
 fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     let limits = &Limits::default();
+    let device_m = point_sigma(args.point_sigma_m)?;
     let model = judged(args, (&args.urdf, args.compensation.as_deref()), (file, unit))?;
     refuse_mistaken(&model, &args.urdf, file, limits)?;
     refuse_far(&model, &args.urdf, file)?;
@@ -73,7 +74,7 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     });
     let nominal = nominal.transpose()?;
     let stated = Stated::beside(&args.urdf, &model.robot);
-    let expected = stated.as_ref().and_then(|s| Some((s, s.at_points(&model.points)?)));
+    let expected = stated.as_ref().and_then(|s| Some((s, s.at_points(&model.points, device_m)?)));
     // What the model itself may miss, different in every posture, is no step of the device.
     let may_miss = expected.as_ref().is_some_and(|(_, expected)| model.fit.rms_m <= expected.most_m);
     let moved = device_moved(&model.robot, &model.points, &model.fit, limits).filter(|_| !may_miss);
@@ -108,6 +109,19 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     Ok(reasons.verdict())
+}
+
+/// As stated; nothing where it is not.
+fn point_sigma(stated: Option<f64>) -> Result<f64> {
+    match stated.unwrap_or(0.0) {
+        sigma if (0.0..FARTHEST_M).contains(&sigma) => Ok(sigma),
+        sigma => Err(Error::new(
+            Code::OptionRange,
+            "--point-sigma-m",
+            format!("{sigma} is no sigma of points in metres"),
+            "give metres: 0.00005 are 0.05 mm",
+        )),
+    }
 }
 
 /// The error of a model over that of the nominal one, by the points but some.

@@ -35,6 +35,8 @@ pub(super) struct Expectation {
 const OBSERVATIONS: &str = "observations.csv";
 /// Ends of the names of images and recordings.
 const RECORDED: [&str; 8] = ["png", "tif", "tiff", "pgm", "jpg", "jpeg", "bmp", "mcap"];
+/// Parameters of frame and reflector, which every fit of points takes up.
+const FITTED: f64 = 9.0;
 /// Folders of images that several series may have in common.
 const FLAT_FIELD: [&str; 2] = ["dark", "white"];
 
@@ -79,8 +81,8 @@ impl Stated {
         Some(Expectation { most_m, ..expected })
     }
 
-    /// Of points, what the fit of frame and reflector takes up left out.
-    pub fn at_points(&self, points: &[MeasuredPoint]) -> Option<Expectation> {
+    /// Of points, with the sigma per axis of the device, what the fit of frame and reflector takes up left out.
+    pub fn at_points(&self, points: &[MeasuredPoint], device_m: f64) -> Option<Expectation> {
         let known = self.found.known_robot(None).ok()?;
         let robot = &self.found.robot;
         let left = fit_points(robot, points)?.expected(robot, points, known.covariance(), &self.found.joint_sigma)?;
@@ -93,7 +95,13 @@ impl Stated {
             };
             Some(fit_points(part, &points.iter().map(of_whole).collect::<Vec<_>>())?.rms_m)
         });
-        self.expectation((left.model_m, lacking_m?), scatter_m)
+        let expected = self.expectation((left.model_m, lacking_m?), scatter_m)?;
+        // Of so many coordinates, less what frame and reflector take up.
+        let count = points.len() as f64;
+        let freedom = (3.0 * count - FITTED).max(1.0);
+        let device_m = device_m * (freedom / count).sqrt();
+        let most_m = device_m * (1.0 + NORMAL_95 / (2.0 * freedom).sqrt());
+        Some(Expectation { rms_m: expected.rms_m.hypot(device_m), most_m: expected.most_m.hypot(most_m) })
     }
 
     /// Of the errors of the model, what a part of it lacks, and the scatter of single stops.

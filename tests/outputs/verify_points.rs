@@ -220,6 +220,11 @@ fn readings_in_another_unit_are_no_good_verdict() {
 
 /// Points of the robot of the shipped report, within the ranges of its stops, with this error of the zero of its third joint, rad.
 fn measured_by_a_tracker(folder: &Path, zero: f64) -> PathBuf {
+    measured_with(folder, zero, 2e-5)
+}
+
+/// The same by a device of this sigma per axis, m.
+fn measured_with(folder: &Path, zero: f64, sigma_m: f64) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let truth = Truth::read(&root.join("datasets/kr6_small/truth.toml")).unwrap();
     let robot = truth.robot(&kr6().1.chain).unwrap();
@@ -228,11 +233,11 @@ fn measured_by_a_tracker(folder: &Path, zero: f64) -> PathBuf {
         let mut readings = held.readings.clone();
         readings[2] += zero;
         let error = [1, 3, 5].map(|step| (step * k % 7) as f64 / 2.0 - 1.5);
-        let at = robot.base_from_tip(&readings).transform(&[0.03, -0.02, 0.1].into()) + 2e-5 * Vector3::from(error);
+        let at = robot.base_from_tip(&readings).transform(&[0.03, -0.02, 0.1].into()) + sigma_m * Vector3::from(error);
         let cells: Vec<String> = at.iter().chain(&held.readings).map(|v| format!("{v:.9}")).collect();
         writeln!(table, "{}", cells.join(",")).unwrap();
     }
-    let file = folder.join(format!("points_{zero}.csv"));
+    let file = folder.join(format!("points_{zero}_{sigma_m}.csv"));
     std::fs::write(&file, table).unwrap();
     file
 }
@@ -259,6 +264,13 @@ fn points_that_a_model_misses_by_more_than_its_solution_states_are_no_good_verdi
         assert_eq!(judged(&urdf, &right, &flags), (Some(0), vec![]));
         assert_eq!(judged(&urdf, &changed, &flags), (Some(1), vec![Code::StatedExceeded]));
     }
+    // What a device is known to scatter by is no error of the model.
+    let own = ["--compensation", compensation];
+    let noisy = measured_with(folder.path(), 0.0, 5e-4);
+    assert_eq!(judged(&urdf, &noisy, &own), (Some(1), vec![Code::StatedExceeded]));
+    assert_eq!(judged(&urdf, &noisy, &[own[0], own[1], "--point-sigma-m", "0.0005"]), (Some(0), vec![]));
+    assert_eq!(judged(&urdf, &changed, &[own[0], own[1], "--point-sigma-m", "0.00002"]).0, Some(1));
+    assert_eq!(judged(&urdf, &noisy, &[own[0], own[1], "--point-sigma-m", "-1"]).0, Some(2));
     // A compensation.toml of the URDF lies beside it, and no solution.
     let copy = folder.path().join("copy.urdf");
     std::fs::copy(&urdf, &copy).unwrap();
