@@ -9,7 +9,7 @@ use crate::error::Notice;
 use crate::identify::{Comparison, Estimator, LensEvidence};
 use crate::output::solution_json::{EstimateRecord, PlateRecord, SolutionRecord};
 use crate::output::verdict::{Trust, Verdict};
-use crate::problem::{OriginPrior, short_name};
+use crate::problem::{InstrumentKind, OriginPrior, short_name};
 use crate::urdf::JointKind;
 
 /// Most lines of one kind before the rest is counted.
@@ -316,7 +316,15 @@ fn two_stage(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 
 /// What the lengths of the robot hang on.
 fn scales(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
-    let lines: BTreeSet<String> = r.plate_sizes().filter_map(|(e, plate)| scale(e, plate)).collect();
+    let of_plates = r.plate_sizes().filter_map(|(e, plate)| scale(e, plate));
+    let measure = r.bodies.instruments.iter().filter(|i| i.kind != InstrumentKind::Socket);
+    let of_trackers = measure.map(|i| {
+        format!(
+            "scale     the scale of {} counts as exact, and is in no sigma: 0.1 % is 1 mm a metre, 1 ppm 1 um",
+            i.name
+        )
+    });
+    let lines: BTreeSet<String> = of_plates.chain(of_trackers).collect();
     lines.into_iter().try_for_each(|line| writeln!(out, "{line}"))
 }
 

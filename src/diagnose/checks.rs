@@ -90,7 +90,13 @@ pub const CHECKS: &[Check] = &[
     check("zeros_off", Stage::LeftOut(|a, s| found(zeros_off::check(a, s)))),
     check("plate_size", Stage::Fit(|a, b, s| found(plate_size::check(a, b, s)))),
     check("contradicted_distances", Stage::Fit(|a, b, s| found(contradicted_distances::check(a, b, s)))),
-    check("length_standard", Stage::Fit(|a, b, s| found(length_standard::check(a, b, s)))),
+    Check {
+        explains: |own, other| match (own, other) {
+            (Finding::ContradictedLengths(own), Finding::DoubtedSize(plate)) => own.explains(plate),
+            _ => false,
+        },
+        ..check("length_standard", Stage::Fit(|a, b, s| found(length_standard::check(a, b, s))))
+    },
     check("marker_off", Stage::Fit(|a, b, s| found(marker_off::check(a, b, s)))),
     check("tag_size", Stage::Fit(|a, b, s| found(tag_size::check(a, b, s)))),
     check("parameter_off", Stage::Fit(|a, b, s| found(parameter_off::check(a, b, s)))),

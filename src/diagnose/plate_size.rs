@@ -3,13 +3,13 @@
 use nalgebra::DVector;
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::rail::{OR_THE_RAIL, is_on_rail, with_gears_released};
 use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem, SCALE, State, UNKNOWN_SCALE, seen_markers, size_by_distance};
 use crate::series::Plate;
 use crate::solve::{ComponentOptions, Status, System, estimate_components};
-use crate::urdf::JointKind;
 
 const ASPECT: usize = 1;
 
@@ -47,7 +47,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     let Adjustment { problem, state } = &fit.adjustment;
     let limits = setting.limits;
     let some = fit.adjustment.some_stops(MOST_STOPS, MOST_STOPS);
-    let on_rail = state.robot.chain.reading_kinds.contains(&JointKind::Prismatic);
+    let on_rail = is_on_rail(state);
     let mut doubts = Vec::new();
     for (k, plate) in problem.plates.iter().enumerate() {
         let released = ReleasedSize::of(some.as_ref().unwrap_or(&fit.adjustment), k);
@@ -134,8 +134,7 @@ impl Kind for DoubtedSize {
             }
             Self::Uneven { .. } => "measure two far markers and give [scale] in plate.toml",
         };
-        let rail =
-            if on_rail { "; or the rail moves by more or less than it reads: try --robot-model gear" } else { "" };
+        let rail = if on_rail { OR_THE_RAIL } else { "" };
         format!("{remedy}{rail}")
     }
 }
@@ -157,21 +156,39 @@ struct ReleasedSize<'a> {
     stated: f64,
 }
 
+/// Makes the size of a plate one of which nothing is known beforehand.
+fn release(adjustment: &mut Adjustment, index: usize) {
+    let at = adjustment.problem.layout.shapes[index].start + SCALE;
+    adjustment.problem.layout.columns[at].prior_sigma = UNKNOWN_SCALE;
+    let released = &mut adjustment.problem.plates[index];
+    released.scale = None;
+    // The markers keep the places that were found: as corrections with a tolerance in metres they would ask for a plate of no size.
+    released.markers.iter_mut().for_each(|m| m.sigma_m = 0.0);
+    let shape = &mut adjustment.state.plates[index];
+    for (nominal, correction) in shape.nominal.iter_mut().zip(&mut shape.corrections) {
+        *nominal += std::mem::take(correction);
+    }
+}
+
+/// With sizes of plates of which nothing is known beforehand; `None` where none tells a size.
+pub(super) fn with_sizes_released(whole: &Adjustment) -> Option<Adjustment> {
+    let layout = &whole.problem.layout;
+    let is_free = |k: &usize| layout.columns[layout.shapes[*k].start + SCALE].free;
+    let plates: Vec<usize> = (0..whole.problem.plates.len()).filter(is_free).collect();
+    (!plates.is_empty()).then(|| {
+        let mut released = whole.clone();
+        plates.into_iter().for_each(|k| release(&mut released, k));
+        released
+    })
+}
+
 impl<'a> ReleasedSize<'a> {
     fn of(whole: &'a Adjustment, index: usize) -> Self {
-        let mut adjustment = whole.clone();
+        let mut adjustment = with_gears_released(whole).unwrap_or_else(|| whole.clone());
         let plate = &whole.problem.plates[index];
-        let column = &mut adjustment.problem.layout.columns[whole.problem.layout.shapes[index].start + SCALE];
+        let column = &whole.problem.layout.columns[whole.problem.layout.shapes[index].start + SCALE];
         let stated = plate.scale.map_or(column.prior_sigma, |bar| bar.sigma_m / bar.distance_m);
-        column.prior_sigma = UNKNOWN_SCALE;
-        let released = &mut adjustment.problem.plates[index];
-        released.scale = None;
-        // The markers keep the places that were found: as corrections with a tolerance in metres they would ask for a plate of no size.
-        released.markers.iter_mut().for_each(|m| m.sigma_m = 0.0);
-        let shape = &mut adjustment.state.plates[index];
-        for (nominal, correction) in shape.nominal.iter_mut().zip(&mut shape.corrections) {
-            *nominal += std::mem::take(correction);
-        }
+        release(&mut adjustment, index);
         Self { adjustment, index, plate, stated }
     }
 

@@ -7,14 +7,17 @@ use std::path::Path;
 use robotcal::Code;
 use robotcal::assess::{View, predict_pose};
 use robotcal::geom::Pose;
-use robotcal::identify::{Options, Solution, identify};
+use robotcal::identify::{Options, RobotModel, Solution, identify};
+use robotcal::problem::{BodySeen, MeasuredSeries};
 use robotcal::series::CameraMount;
 use robotcal::simulate::SimulatedSeries;
 use robotcal::study::measured;
 use robotcal::urdf::{BASE_FROM_BASE, Chain, RobotDescription, patch_origins};
 
 use crate::coverage::world;
+use crate::measured_worlds::{Kind, World, readings, truth};
 use crate::said::assert_says;
+use crate::support::small::Dice;
 
 const POSITIONER: &str = r#"
   <link name="trunnion"/><link name="table"/>
@@ -178,4 +181,33 @@ fn mistakes_in_what_stands_beside_the_arm_are_named() {
             assert_says(&constant, Code::LinkLengthsWrong, &names);
         }
     }
+}
+
+/// The gear of a rail is as wrong as a tracker may be: links alone tell which of them it is.
+#[test]
+fn a_rail_that_moves_by_less_than_it_reads_is_no_fault_of_the_tracker() {
+    let chain = with(RAIL).chain(None, Some("link_6")).unwrap();
+    let rail = chain.readings.iter().position(|name| name == "rail").unwrap();
+    let mut dice = Dice::new(61);
+    let truth = truth(&mut dice, &chain);
+    let mut world = World::taken(dice, truth, Kind::Poses, 40, (5e-5, 1e-4), 2e-5, |dice| {
+        let mut q = readings(dice);
+        q.insert(rail, dice.between(-0.8, 0.8));
+        let errors = (0..q.len()).map(|_| dice.normal(2e-5)).collect();
+        (q, errors)
+    });
+    world.series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| q[rail] *= 1.002);
+    let doubted = |series: MeasuredSeries| {
+        let options = Options { model: RobotModel::Gear, ..Options::default() };
+        let solution = identify(chain.clone(), &[series], &options).unwrap();
+        solution.findings.iter().any(|f| f.fails() && f.code() == Code::LengthsContradicted)
+    };
+    assert!(!doubted(world.series.clone()));
+    let mut off = world.series.clone();
+    for body in &mut off.bodies {
+        if let BodySeen::Pose(pose) = &mut body.seen {
+            pose.translation *= 1.02;
+        }
+    }
+    assert!(doubted(off));
 }

@@ -1,8 +1,9 @@
 //! Stops at which two kinds of measurements were taken: one latent joint error a stop, whatever measured it.
 
 use nalgebra::{Vector3, Vector6};
+use robotcal::error::Code;
 use robotcal::geom::Pose;
-use robotcal::identify::{JointNoise, Solution};
+use robotcal::identify::{JointNoise, Options, RobotModel, Solution, identify};
 use robotcal::model::plate_modes::PRIOR_SIGMA;
 use robotcal::model::robot::Robot;
 use robotcal::problem::{BodySeen, InstrumentKind, MeasuredSeries, PlateShape, SeenBody};
@@ -173,6 +174,30 @@ fn two_kinds_of_measurements_of_a_stop_share_its_joint_errors() {
     for (column, scatter) in [(0, 0.13), (2, 0.45)] {
         let (mean, _) = mean(&all.iter().map(|judged| judged[column]).collect::<Vec<_>>());
         assert!((mean - 1.0).abs() < 4.0 * scatter, "{all:?}");
+    }
+}
+
+/// A tracker one percent off contradicts plate and links: it is said once, and the plate is not blamed.
+#[test]
+fn a_tracker_and_a_plate_that_contradict_each_other_are_named_once() {
+    for factor in [1.0, 1.01, 0.99] {
+        let mut seen = seen([Kind::HandCamera, Kind::TrackerPoses], 431);
+        for body in seen.series.iter_mut().flat_map(|s| &mut s.bodies) {
+            if let BodySeen::Pose(pose) = &mut body.seen {
+                pose.translation *= factor;
+            }
+        }
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        let solution = identify(robot().chain(None, None).unwrap(), &seen.series, &options).unwrap();
+        let said: Vec<(Code, f64)> = (solution.findings.iter())
+            .filter(|f| f.fails() && [Code::LengthsContradicted, Code::PlateSizeContradicted].contains(&f.code()))
+            .map(|f| (f.code(), f.quantities()[0].value))
+            .collect();
+        match said[..] {
+            [] => assert_eq!(factor, 1.0),
+            [(Code::LengthsContradicted, off)] => assert!((off - (factor - 1.0)).abs() < 4e-3, "{factor}: {off}"),
+            _ => panic!("{factor}: {said:?}"),
+        }
     }
 }
 
