@@ -146,7 +146,7 @@ codes! {
         JointUnitMissing "joint_unit_missing" "nothing states whether joint readings are degrees or radians",
         DegreesAsRadians "degrees_as_radians" "readings said to be radians are degrees",
         RadiansAsDegrees "radians_as_degrees" "readings said to be degrees are radians",
-        MillimetresAsMetres "millimetres_as_metres" "readings of a prismatic joint are millimetres, centimetres or inches",
+        MillimetresAsMetres "millimetres_as_metres" "readings of a prismatic joint are millimetres, centimetres, inches or feet",
         JointMissing "joint_missing" "a joint of the chain has no readings",
         JointUnused "joint_unused" "readings are of no joint of the chain",
         CovariatesUnused "covariates_unused" "measured torques or temperatures are not used",

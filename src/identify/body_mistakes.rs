@@ -1,7 +1,7 @@
 //! When readings and what an instrument saw of a body do not fit: the usual mistakes in either, tried one by one, named where one of them
 //! explains it.
 
-use super::misread::MISREAD;
+use super::misread::all_misread;
 use super::mistakes::mistakes_undone;
 use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake};
@@ -42,8 +42,8 @@ pub(super) fn name_mistake(
         return Ok(());
     }
     let readings: Vec<Vec<f64>> = given.iter().map(|s| s.readings.clone()).collect();
-    let read_otherwise = MISREAD.iter().filter_map(|misread| {
-        let undone = |s: &SeenAt| Some(SeenAt { seen: (misread.undone)(s.seen)?, readings: s.readings.clone(), ..*s });
+    let read_otherwise = all_misread().filter_map(|misread| {
+        let undone = |s: &SeenAt| Some(SeenAt { seen: misread.undone(s.seen)?, readings: s.readings.clone(), ..*s });
         Some((given.iter().map(undone).collect::<Option<Vec<_>>>()?, misread.kind()))
     });
     let of_readings = mistakes_undone(robot, &readings).into_iter().map(|(readings, kind)| {

@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::misread::{MISREAD, Misread};
+use super::misread::all_misread;
 use super::mistakes::mistakes_undone;
 use crate::assess::Limits;
 use crate::diagnose::{Mistake, MistakeKind};
@@ -124,13 +124,12 @@ fn read_otherwise(robot: &KnownRobot, touches: &Touches) -> impl Iterator<Item =
         undone.postures.iter_mut().zip(readings).for_each(|(p, readings)| p.readings = readings);
         (undone, What::Kind(kind))
     });
-    let has_places = |_: &&Misread| touches.frame.is_some();
-    let of_places = MISREAD.iter().filter(has_places).filter_map(|misread| {
+    let of_places = all_misread().filter(|_| touches.frame.is_some()).filter_map(|misread| {
         let mut undone = touches.clone();
         for touch in &mut undone.all {
             touch.seen = match touch.seen {
-                Seen::Point(point) => seen((misread.undone)(BodySeen::Point(point))?),
-                Seen::Pose(pose) => seen((misread.undone)(BodySeen::Pose(pose))?),
+                Seen::Point(point) => seen(misread.undone(BodySeen::Point(point))?),
+                Seen::Pose(pose) => seen(misread.undone(BodySeen::Pose(pose))?),
                 unknown @ Seen::Unknown(_) => unknown,
             };
         }

@@ -18,10 +18,11 @@ pub(super) const SMALL_DEG: f64 = 6.3;
 /// The same of a rail, m.
 const SOFT_LIMITS_M: f64 = 0.01;
 /// Units that lengths are recorded in, beside metres.
-pub const LENGTH_UNITS: [LengthUnit; 3] = [
+pub const LENGTH_UNITS: [LengthUnit; 4] = [
     LengthUnit { name: "millimetres", sign: "mm", metres: 1e-3 },
     LengthUnit { name: "centimetres", sign: "cm", metres: 1e-2 },
     LengthUnit { name: "inches", sign: "inch", metres: 0.0254 },
+    LengthUnit { name: "feet", sign: "ft", metres: 0.3048 },
 ];
 /// Fewer stops than this say nothing about their unit.
 const MANY_STOPS: usize = 3;

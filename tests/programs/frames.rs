@@ -631,7 +631,9 @@ fn usual_mistakes_in_touches_are_named() {
     let sign = |touches: &mut Touches| touches.postures.iter_mut().for_each(|p| p.readings[3] *= -1.0);
     is(named(&sign), Code::JointSignWrong, "joint_a4");
     is(named(&|t| places(t, 0..16, &|p| p.y = -p.y)), Code::AxesMirrored, "left-handed");
-    is(named(&|t| places(t, 0..16, &|p| *p /= 0.0254)), Code::MeasuredUnit, "inches");
+    for (metres, name) in [(0.0254, "inches"), (0.3048, "feet")] {
+        is(named(&|t| places(t, 0..16, &|p| *p /= metres)), Code::MeasuredUnit, name);
+    }
     is(named(&|t| t.all[6].seen = t.all[0].seen), Code::PlaceContradicted, "t06");
     is(named(&|t| places(t, 7..16, &|p| p.x += 1e-3)), Code::WorkDisplaced, "from t07 on");
     let bent = Toucher { tool: Vector3::from(TOOL) + Vector3::new(1e-3, 0.0, 0.0), ..toucher };

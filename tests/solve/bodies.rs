@@ -317,8 +317,11 @@ fn mistakes_in_the_file_of_a_tracker_are_named() {
             let [x, y, z, w] = pose.quaternion_xyzw();
             turned(pose, [w, x, y, z]);
         };
-        let of_positions: [Misread; 2] = [
+        let of_positions: [Misread; 5] = [
             (&|pose| pose.translation *= 1e3, Code::MeasuredUnit),
+            (&|pose| pose.translation *= 1e2, Code::MeasuredUnit),
+            (&|pose| pose.translation /= 0.0254, Code::MeasuredUnit),
+            (&|pose| pose.translation /= 0.3048, Code::MeasuredUnit),
             (&|pose| pose.translation.x *= -1.0, Code::AxesMirrored),
         ];
         let of_poses: [Misread; 4] = [
