@@ -89,6 +89,39 @@ pub struct ShiftedPart {
     pub to_the_end: bool,
 }
 
+/// The table whose rows are wrong where rows are shifted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowsOf {
+    /// That of the readings, as far as is known.
+    Readings,
+    /// This table of measurements: others fit the readings.
+    Measured(&'static str),
+    /// images.csv, the rows of one camera: others fit the readings.
+    Camera,
+    /// The images of a single camera, by their names: what else was measured fits the readings.
+    Pictures,
+}
+
+impl RowsOf {
+    /// What is to be shifted.
+    fn names(self) -> String {
+        match self {
+            Self::Readings => "the names in the first column of joints.csv".into(),
+            Self::Measured(table) => format!("the names in the first column of {table}"),
+            Self::Camera => "the stops of this camera in images.csv".into(),
+            Self::Pictures => "the names of the images (of observations.csv, its first column)".into(),
+        }
+    }
+
+    /// Why not the readings.
+    const fn reason(self) -> &'static str {
+        match self {
+            Self::Readings => "",
+            _ => " and leave joints.csv as it is, which others fit;",
+        }
+    }
+}
+
 impl MistakeKind {
     /// True where `whole` is the same of all rows.
     pub fn is_part_of(&self, whole: &Self) -> bool {
@@ -115,6 +148,8 @@ pub struct Mistake {
     pub misfit_undone: Option<f64>,
     /// True where images showed it, false where a tracker did.
     pub by_images: bool,
+    /// The table that is wrong, where rows are shifted.
+    pub rows_of: RowsOf,
 }
 
 impl Mistake {
@@ -236,12 +271,16 @@ impl Kind for Mistake {
                 format!("write {joint} {word} {before} into the column {joint} of joints.csv")
             }
             MistakeKind::Rows { part: Some(ShiftedPart { first, last, to_the_end, .. }), .. } => format!(
-                "look for a row that was lost or written twice before {first}, and shift the names in the first column of joints.csv by one row from there on{}; of a recording, see --image-delay and --clock log",
-                if *to_the_end { String::new() } else { format!(" to {last}") }
+                "look for a row that was lost or written twice before {first}, and shift {} by one row from there on{};{} of a recording, see --image-delay and --clock log",
+                self.rows_of.names(),
+                if *to_the_end { String::new() } else { format!(" to {last}") },
+                self.rows_of.reason()
             ),
-            MistakeKind::Rows { columns, .. } if columns.is_empty() => {
-                "shift the names in the first column of joints.csv by one row; of a recording, see --image-delay and --clock log".into()
-            }
+            MistakeKind::Rows { columns, .. } if columns.is_empty() => format!(
+                "shift {} by one row;{} of a recording, see --image-delay and --clock log",
+                self.rows_of.names(),
+                self.rows_of.reason()
+            ),
             MistakeKind::Rows { columns, below, .. } => format!(
                 "shift the columns {} of joints.csv one row {}, and see how they were recorded",
                 columns.join(", "),

@@ -71,7 +71,7 @@ pub use loose::LooseMounting;
 pub use lost_images::LostImages;
 pub use marker_off::MarkerOff;
 pub use measurement_scatter::MeasurementsScatter;
-pub use mistake::{Mistake, MistakeKind, ShiftedPart};
+pub use mistake::{Mistake, MistakeKind, RowsOf, ShiftedPart};
 pub use moved::BodyMoved;
 pub use no_gain::NoGain;
 pub use noticed::Noticed;

@@ -1,36 +1,30 @@
 //! Starting values of instruments and bodies, with the robot as it stands.
 //!
-//! Poses: the closed forms of the hand-eye transform. Points `p_j` of a body at `b` of the tip, `R p_j + t = R_j b + t_j`: linear least squares in
-//! the elements of `R`, in `t` and `b`, then in `t` and `b` alone with the nearest rotation. Sockets: `s = R_j b + t_j` is linear in the places
-//! and `b`.
+//! Poses: the closed forms of the hand-eye transform; points: [`super::points_start`]. Sockets: `s = R_j b + t_j` is linear in the places and `b`.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::body_mistakes::{SeenAt, name_mistake};
+use super::body_breaks::name_break;
+use super::body_misfit::{FEWEST_POSES, usual_misfit};
+use super::body_mistakes::name_mistake;
+use super::places_exchanged::name_exchange;
+use super::points_start::{
+    DISAGREES, FEWEST_POINTS, HOLD, Placed, PointAt, TRIMMINGS, agreeing_in_part, distances, usual_distance,
+};
 use crate::assess::{Limits, median};
 use crate::error::{Code, Error, Result};
-use crate::geom::{Pose, project_to_so3};
+use crate::geom::Pose;
 use crate::init::{PosePair, solve_hand_eye};
 use crate::linalg::SymmetricFactor;
-use crate::model::robot::Robot;
-use crate::problem::{Adjustment, BodyMeasurement, BodyRejection, BodySeen, InstrumentKind, Problem};
-
-/// Information of a prior on unknown lengths, 1/m^2 where measurements have 1: it holds what they do not tell near zero.
-const HOLD: f64 = 1e-6;
-
-/// Rounds of rotation, then translations.
-const ROUNDS: usize = 200;
-
-/// Change of the translations, m, that ends them.
-const STANDING_M: f64 = 1e-7;
+use crate::problem::{Adjustment, BodyMeasurement, BodyRejection, BodySeen, InstrumentKind, MeasuredSeries, Problem};
 
 /// Fills in instruments and bodies.
 ///
 /// # Errors
-/// Too few measurements of a body; poses that no closed form explains; a usual mistake in the readings that does.
-pub(super) fn start_bodies(adjustment: &mut Adjustment, limits: &Limits) -> Result<()> {
+/// Too few measurements of a body; poses that no closed form explains; a usual mistake that does; an instrument or a body that was moved.
+pub(super) fn start_bodies(adjustment: &mut Adjustment, series: &[MeasuredSeries], limits: &Limits) -> Result<()> {
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (k, measured) in adjustment.problem.used_bodies() {
         groups.entry((measured.instrument, measured.body)).or_default().push(k);
@@ -43,16 +37,38 @@ pub(super) fn start_bodies(adjustment: &mut Adjustment, limits: &Limits) -> Resu
         let is_socket = |instrument: &usize| adjustment.problem.instruments[*instrument].kind == InstrumentKind::Socket;
         let (sockets, others): (Vec<_>, Vec<_>) = seen_by.into_iter().partition(|(i, _)| is_socket(i));
         for (instrument, measured) in others {
-            let (frame, at) = framed(adjustment, instrument, &measured)?;
+            let placed = framed(adjustment, instrument, &measured, limits)?;
+            name_exchange(adjustment, &measured, limits)?;
+            // What fits in two parts fits no better by chance, as undone by a mistake that changes little.
+            name_break(adjustment, series, (&measured, &placed), limits)?;
             name_mistake(adjustment, &measured, limits, usual_misfit)?;
-            adjustment.state.instruments[instrument] = frame;
-            adjustment.state.bodies[body] = at;
+            leave_out_others(adjustment, &measured, &placed, limits);
+            (adjustment.state.instruments[instrument], adjustment.state.bodies[body]) = placed;
         }
         if !sockets.is_empty() {
             start_sockets(adjustment, body, &sockets, limits)?;
         }
     }
     Ok(())
+}
+
+/// Leaves out points that disagree with most of the others: they would spoil the noise of all before they are left out by their residuals. Where many
+/// do, that is no matter of single ones.
+fn leave_out_others(adjustment: &mut Adjustment, measured: &[usize], placed: &Placed, limits: &Limits) {
+    let all = &adjustment.problem.body_measurements;
+    let points = measured.iter().filter(|&&k| matches!(all[k].seen, BodySeen::Point(_)));
+    let (rows, points): (Vec<usize>, Vec<PointAt>) =
+        points.filter_map(|&k| Some((k, (all[k].seen.position(), tip(adjustment, &all[k])?)))).unzip();
+    let bound = f64::max(limits.suspicious_misfit, DISAGREES * usual_distance(&points, placed));
+    let far = rows.into_iter().zip(distances(&points, placed)).filter(|(_, distance)| *distance > bound);
+    let far: Vec<(usize, f64)> = far.collect();
+    if far.len() as f64 > limits.share_of_images_left_out * points.len() as f64 {
+        return;
+    }
+    for (k, distance) in far {
+        let measured = &mut adjustment.problem.body_measurements[k];
+        measured.rejected = Some(BodyRejection::Residual { sigmas: distance / measured.sigma_m });
+    }
 }
 
 /// Pose of the tip at the stop of a measurement.
@@ -74,7 +90,7 @@ fn too_few(problem: &Problem, instrument: usize, found: usize, needed: usize) ->
 }
 
 /// Frame of an instrument, `base_from_instrument`, with the body that it sees, `tip_from_body`.
-fn framed(adjustment: &Adjustment, instrument: usize, measured: &[usize]) -> Result<(Pose, Pose)> {
+fn framed(adjustment: &Adjustment, instrument: usize, measured: &[usize], limits: &Limits) -> Result<Placed> {
     let problem = &adjustment.problem;
     let of = |k: &usize| {
         let measured = &problem.body_measurements[*k];
@@ -102,109 +118,12 @@ fn framed(adjustment: &Adjustment, instrument: usize, measured: &[usize]) -> Res
             )
         });
     }
-    let points: Vec<(Vector3<f64>, Pose)> = seen.iter().map(|(seen, tip)| (seen.position(), *tip)).collect();
+    let points: Vec<PointAt> = seen.iter().map(|(seen, tip)| (seen.position(), *tip)).collect();
     if points.len() < FEWEST_POINTS {
         return Err(too_few(problem, instrument, points.len(), FEWEST_POINTS));
     }
-    nearest(&points).ok_or_else(|| too_few(problem, instrument, points.len(), FEWEST_POINTS))
-}
-
-/// Median misfit of the poses (rad + m), or of the points (m), with readings.
-fn usual_misfit(robot: &Robot, seen: &[SeenAt]) -> f64 {
-    let tips: Vec<Pose> = seen.iter().map(|s| robot.base_from_tip(&s.readings)).collect();
-    let pair = |(seen, tip): (&SeenAt, &Pose)| match seen.seen {
-        BodySeen::Pose(pose) => Some(PosePair { camera_from_plate: pose, chain: *tip }),
-        BodySeen::Point(_) => None,
-    };
-    let pairs: Vec<PosePair> = seen.iter().zip(&tips).filter_map(pair).collect();
-    if pairs.len() >= FEWEST_POSES {
-        return solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error);
-    }
-    let points: Vec<(Vector3<f64>, Pose)> = seen.iter().map(|s| s.seen.position()).zip(tips).collect();
-    let distances = |(frame, body): (Pose, Pose)| {
-        let of = |(p, tip): &(Vector3<f64>, Pose)| (frame.transform(p) - tip.transform(&body.translation)).norm();
-        median(&points.iter().map(of).collect::<Vec<f64>>())
-    };
-    nearest(&points).and_then(distances).unwrap_or(f64::INFINITY)
-}
-
-/// Frame and body that points fit best.
-fn nearest(points: &[(Vector3<f64>, Pose)]) -> Option<(Pose, Pose)> {
-    let starts = [all_linear(points), Some(alternating(points, Matrix3::identity()))];
-    let refined = starts.into_iter().flatten().map(|(frame, _)| alternating(points, frame.rotation));
-    refined.min_by(|a, b| misfit(points, a).total_cmp(&misfit(points, b)))
-}
-
-/// Poses from which the closed forms follow.
-const FEWEST_POSES: usize = 3;
-
-/// Points that nine unknowns need.
-const FEWEST_POINTS: usize = 4;
-
-/// Sum of squared distances, m^2.
-fn misfit(points: &[(Vector3<f64>, Pose)], (frame, body): &(Pose, Pose)) -> f64 {
-    points.iter().map(|(p, tip)| (frame.transform(p) - tip.transform(&body.translation)).norm_squared()).sum()
-}
-
-/// `R`, `t` and `b` together; `None` where they are not determined.
-fn all_linear(points: &[(Vector3<f64>, Pose)]) -> Option<(Pose, Pose)> {
-    let (mut n, mut rhs) = (DMatrix::zeros(15, 15), DVector::zeros(15));
-    for (p, tip) in points {
-        let mut row = DMatrix::zeros(3, 15);
-        for k in 0..3 {
-            (0..3).for_each(|d| row[(d, 3 * k + d)] = p[k]);
-            row[(k, 9 + k)] = 1.0;
-        }
-        row.fixed_view_mut::<3, 3>(0, 12).copy_from(&-tip.rotation);
-        n += row.tr_mul(&row);
-        rhs += row.tr_mul(&tip.translation);
-    }
-    (9..15).for_each(|k| n[(k, k)] += HOLD);
-    let x = SymmetricFactor::new(&n).ok()?.solve(&rhs);
-    let rotation = project_to_so3(&Matrix3::from_column_slice(&x.as_slice()[..9]))?;
-    Some((Pose::new(rotation, Vector3::zeros()), Pose::identity()))
-}
-
-/// Rotation and translations by turns, from a rotation.
-fn alternating(points: &[(Vector3<f64>, Pose)], mut rotation: Matrix3<f64>) -> (Pose, Pose) {
-    let mut found = (Pose::identity(), Pose::identity());
-    for _ in 0..ROUNDS {
-        let Some(next) = translations(points, &rotation) else { break };
-        let moved =
-            (next.0.translation - found.0.translation).norm() + (next.1.translation - found.1.translation).norm();
-        found = next;
-        let Some(better) = turn(points, &found.1.translation) else { break };
-        rotation = better;
-        if moved < STANDING_M {
-            break;
-        }
-    }
-    found
-}
-
-/// `t` and `b` for a rotation.
-fn translations(points: &[(Vector3<f64>, Pose)], rotation: &Matrix3<f64>) -> Option<(Pose, Pose)> {
-    let (mut n, mut rhs) = (DMatrix::identity(6, 6) * HOLD, DVector::zeros(6));
-    for (p, tip) in points {
-        let mut row = DMatrix::zeros(3, 6);
-        row.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
-        row.fixed_view_mut::<3, 3>(0, 3).copy_from(&-tip.rotation);
-        n += row.tr_mul(&row);
-        rhs += row.tr_mul(&(tip.translation - rotation * p));
-    }
-    let x = SymmetricFactor::new(&n).ok()?.solve(&rhs);
-    let part = |first: usize| x.fixed_rows::<3>(first).into_owned();
-    Some((Pose::new(*rotation, part(0)), Pose::new(Matrix3::identity(), part(3))))
-}
-
-/// The rotation that brings the points to where the tip carries the body (K. Arun, T. Huang, S. Blostein 1987).
-fn turn(points: &[(Vector3<f64>, Pose)], body: &Vector3<f64>) -> Option<Matrix3<f64>> {
-    let count = points.len() as f64;
-    let carried = |tip: &Pose| tip.transform(body);
-    let mean_seen = points.iter().map(|(p, _)| p).sum::<Vector3<f64>>() / count;
-    let mean_carried = points.iter().map(|(_, tip)| carried(tip)).sum::<Vector3<f64>>() / count;
-    let product = |(p, tip): &(Vector3<f64>, Pose)| (carried(tip) - mean_carried) * (p - mean_seen).transpose();
-    project_to_so3(&points.iter().map(product).sum::<Matrix3<f64>>())
+    agreeing_in_part(&points, limits.suspicious_misfit)
+        .ok_or_else(|| too_few(problem, instrument, points.len(), FEWEST_POINTS))
 }
 
 /// Places of sockets and the body in the tip, from all sockets that hold it.
@@ -259,19 +178,26 @@ impl InSockets {
         };
         held.iter().map(of).collect()
     }
+
+    /// With every socket where most of its stops have the body: some of another socket would draw their mean away from all.
+    fn with_usual_places(&self, held: &[(usize, Pose)]) -> Self {
+        let mut touched: BTreeMap<usize, Vec<Vector3<f64>>> = BTreeMap::new();
+        for (socket, tip) in held {
+            touched.entry(*socket).or_default().push(tip.transform(&self.body));
+        }
+        let along = |all: &[Vector3<f64>], axis: usize| {
+            median(&all.iter().map(|at| at[axis]).collect::<Vec<f64>>()).unwrap_or_default()
+        };
+        let middle = |all: Vec<Vector3<f64>>| Vector3::from_fn(|axis, _| along(&all, axis));
+        Self { body: self.body, places: touched.into_iter().map(|(socket, all)| (socket, middle(all))).collect() }
+    }
 }
-
-/// Rounds in which stops that disagree are left out of a start.
-const TRIMMINGS: usize = 5;
-
-/// Times the median misfit beyond which a stop disagrees.
-const DISAGREES: f64 = 4.0;
 
 /// From the stops that agree: those of a wrong socket would spoil it for all.
 fn in_sockets(held: &[(usize, Pose)]) -> Option<InSockets> {
     let mut found = by_all(held)?;
     for _ in 0..TRIMMINGS {
-        let misfits = found.misfits(held);
+        let misfits = found.with_usual_places(held).misfits(held);
         let bound = DISAGREES * median(&misfits)?;
         let agreeing: Vec<(usize, Pose)> =
             held.iter().zip(&misfits).filter(|(_, misfit)| **misfit <= bound).map(|(stop, _)| *stop).collect();

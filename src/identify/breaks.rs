@@ -40,7 +40,7 @@ pub(super) fn broken(suspects: &Suspects, misfit: f64, of: &str) -> Option<Error
 }
 
 /// Readings that stay the same for a while.
-fn not_read(Suspects { problem, robot, series, pairs, limits }: &Suspects, misfit: f64) -> Option<Error> {
+fn not_read(Suspects { problem, robot, series, pairs, limits, .. }: &Suspects, misfit: f64) -> Option<Error> {
     let shown: BTreeSet<usize> = pairs.iter().map(|(i, _)| problem.images[*i].series).collect();
     let own: Vec<&MeasuredSeries> = shown.into_iter().map(|k| &series[k]).collect();
     let few = limits.moved_images;
@@ -56,6 +56,13 @@ fn not_read(Suspects { problem, robot, series, pairs, limits }: &Suspects, misfi
     Some(Error::new(Code::JointReadingsWrong, place, what, remedy))
 }
 
+/// Where rows are divided best, those that fit before it where `is_first`, else behind it, with how many stand on the wrong side.
+pub(super) fn divided(fits: &[bool], is_first: bool) -> (usize, usize) {
+    let n = fits.len();
+    let missed = |at: usize| fits.iter().enumerate().filter(|(k, fits)| **fits != ((*k < at) == is_first)).count();
+    (0..=n).map(|at| (missed(at), at)).min().unwrap_or((n, n))
+}
+
 /// A part of a series that fits by itself.
 struct Part {
     solution: HandEye,
@@ -68,10 +75,8 @@ struct Part {
 impl Part {
     /// Divides where the solution of the first part, or the last, serves best.
     fn of(solution: HandEye, fits: &[bool], is_first: bool) -> Self {
-        let n = fits.len();
-        let missed = |at: usize| fits.iter().enumerate().filter(|(k, fits)| **fits != ((*k < at) == is_first)).count();
-        let (missed, at) = (0..=n).map(|at| (missed(at), at)).min().unwrap_or((n, n));
-        Self { solution, others: if is_first { at..n } else { 0..at }, missed }
+        let (missed, at) = divided(fits, is_first);
+        Self { solution, others: if is_first { at..fits.len() } else { 0..at }, missed }
     }
 
     /// What the others agree on, if most of them do.

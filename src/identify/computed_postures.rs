@@ -62,7 +62,7 @@ impl Compared {
         hold: impl FnOnce(&mut Adjustment) -> Result<()>,
     ) -> Option<Self> {
         let (mut adjustment, free, mut verdicts) = free_poses_of(robot, series, limits, hold).ok()?;
-        start_robot(&mut adjustment, &free, StartGiven { series, limits }, &mut verdicts).ok()?;
+        start_robot(&mut adjustment, &free, StartGiven { series, groups: &[], limits }, &mut verdicts).ok()?;
         let layout = &adjustment.problem.layout;
         let columns: Vec<usize> = (0..layout.theta_len()).filter(|&c| layout.columns[c].free).collect();
         let prior = columns.iter().map(|&c| layout.columns[c].prior_sigma.powi(-2));

@@ -93,8 +93,9 @@ pub(super) fn fit_model(
     let mut starts = left.verdicts.clone();
     let on_robot = start.problem.used_on_robot().count();
     check_on_robot(&start.problem, on_robot)?;
-    let aside = start_robot(&mut start, free, StartGiven { series, limits: &options.limits }, &mut starts)?;
-    start_bodies(&mut start, &options.limits)?;
+    let aside =
+        start_robot(&mut start, free, StartGiven { series, groups: &[], limits: &options.limits }, &mut starts)?;
+    start_bodies(&mut start, series, &options.limits)?;
     let (mut outcome, before) = {
         let _stage = stage("joint fit");
         fit(start, free, (&aside, near.as_ref()), options)

@@ -10,6 +10,12 @@ pub(super) type Undone = (Vec<Vec<f64>>, MistakeKind);
 
 /// Every one of a single joint, of two or three, of all, and of rows.
 pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> {
+    let of_rows = shifted_rows(given).into_iter().flat_map(|shifted| whole_and_parted(robot, given, shifted));
+    columns_undone(robot, given).into_iter().chain(of_rows).collect()
+}
+
+/// Those of columns.
+pub(super) fn columns_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> {
     let (names, kinds) = (&robot.chain.readings, &robot.chain.reading_kinds);
     let n = names.len();
     let named = |joints: &[usize]| joints.iter().map(|&k| names[k].clone()).collect();
@@ -56,20 +62,23 @@ pub(super) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> 
         });
     }
     add(MistakeKind::Reversed(names.clone()), &|q| q.reverse());
-    for (shifted, mistake) in shifted_rows(given) {
-        // Positioner, rail or second arm stand before the first arm, or behind it, and may have been recorded apart.
-        let below = matches!(mistake, MistakeKind::Rows { below: true, .. });
-        let of_columns = (1..n).flat_map(|k| [0..k, k..n]).map(|columns| {
-            let mut changed = given.to_vec();
-            let rows = changed.iter_mut().zip(&shifted);
-            rows.for_each(|(q, of)| q[columns.clone()].copy_from_slice(&of[columns.clone()]));
-            (changed, MistakeKind::Rows { below, columns: names[columns].to_vec(), part: None })
-        });
-        let of_columns: Vec<Undone> = of_columns.collect();
-        all.push((shifted, mistake));
-        all.extend(of_columns);
-    }
     all
+}
+
+/// Shifted rows of all columns, and of some: positioner, rail or second arm stand before the first arm, or behind it, and may have been recorded
+/// apart.
+pub(super) fn whole_and_parted(robot: &Robot, given: &[Vec<f64>], (shifted, mistake): Undone) -> Vec<Undone> {
+    let names = &robot.chain.readings;
+    let n = names.len();
+    let below = matches!(mistake, MistakeKind::Rows { below: true, .. });
+    let of_columns = (1..n).flat_map(|k| [0..k, k..n]).map(|columns| {
+        let mut changed = given.to_vec();
+        let rows = changed.iter_mut().zip(&shifted);
+        rows.for_each(|(q, of)| q[columns.clone()].copy_from_slice(&of[columns.clone()]));
+        (changed, MistakeKind::Rows { below, columns: names[columns].to_vec(), part: None })
+    });
+    let of_columns: Vec<Undone> = of_columns.collect();
+    std::iter::once((shifted, mistake)).chain(of_columns).collect()
 }
 
 /// Readings of the row below, or above.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::bases;
 use super::breaks::broken;
+use super::rows_of::rows_of_images;
 use super::start_verdict::{StartReached, StartVerdict};
 use super::suspects::{Suspects, best_scale, directions_alone, left_by_scale};
 use crate::assess::{Limits, median};
@@ -27,6 +28,8 @@ const COMPARED: usize = 4;
 pub(super) struct StartGiven<'a> {
     /// The series of the images.
     pub series: &'a [MeasuredSeries],
+    /// All images by mounting and placement, with what they and their readings say; filled in by the start.
+    pub groups: &'a [Vec<(usize, PosePair)>],
     /// Limits.
     pub limits: &'a Limits,
 }
@@ -46,8 +49,10 @@ pub(super) fn start_robot(
     let mut order: Vec<(_, Vec<(usize, PosePair)>)> =
         seen_stops(adjustment, free).into_iter().map(|(of, seen)| (of, pairs(seen))).collect();
     order.sort_by_key(|((m, p), pairs)| (std::cmp::Reverse(pairs.len()), *m, *p));
+    let (keys, groups): (Vec<_>, Vec<_>) = order.into_iter().unzip();
+    let given = StartGiven { groups: &groups, ..given };
     let (mut cameras, mut plates) = (BTreeMap::new(), BTreeMap::new());
-    for ((mounting, placement), pairs) in &order {
+    for ((mounting, placement), pairs) in keys.iter().zip(&groups) {
         let poses: Vec<PosePair> = pairs.iter().map(|(_, p)| *p).collect();
         let problem = &adjustment.problem;
         let of = format!(
@@ -186,7 +191,7 @@ fn closed_form(
     poses: &[PosePair],
     (mounting, placement): (usize, usize),
     of: &str,
-    StartGiven { series, limits }: StartGiven<'_>,
+    StartGiven { series, groups, limits }: StartGiven<'_>,
     verdicts: &mut Vec<StartVerdict>,
 ) -> Result<HandEye> {
     let fewest = limits.hand_eye_images;
@@ -225,7 +230,7 @@ fn closed_form(
             won: s.origin == winner,
         });
     }
-    let suspects = Suspects { problem, robot: &state.robot, series, pairs, limits };
+    let suspects = Suspects { problem, robot: &state.robot, series, pairs, groups, limits };
     check_fit(&suspects, best.median_error, of, "even at the best start")?;
     Ok(best.solution)
 }
@@ -237,7 +242,7 @@ fn check_shared(
     pairs: &[(usize, PosePair)],
     shared: &HandEye,
     of: &str,
-    StartGiven { series, limits }: StartGiven<'_>,
+    StartGiven { series, groups, limits }: StartGiven<'_>,
 ) -> Result<()> {
     let poses: Vec<PosePair> = pairs.iter().map(|(_, pair)| *pair).collect();
     let misfit = shared.median_error(&poses);
@@ -257,14 +262,16 @@ fn check_shared(
             "write another mounting under [camera] of one of the series, or another placement in its joints.csv";
         return Err(Error::new(Code::SharedPoseDiffers, of, what, remedy));
     }
-    let suspects = Suspects { problem, robot: &state.robot, series, pairs, limits };
+    let suspects = Suspects { problem, robot: &state.robot, series, pairs, groups, limits };
     check_fit(&suspects, misfit, of, "with what is shared with other images")
 }
 
 /// Refuses what does not fit: for the mistake that explains it, or because it is too far off.
 fn check_fit(suspects: &Suspects, misfit: f64, of: &str, how: &str) -> Result<()> {
     if let Some((kind, misfit_undone)) = suspects.better_than(misfit) {
-        let mistake = Mistake { kind, of: of.to_owned(), misfit, misfit_undone, by_images: true };
+        let rows_of =
+            rows_of_images(suspects.problem, suspects.robot, (suspects.pairs, suspects.groups), suspects.limits);
+        let mistake = Mistake { kind, of: of.to_owned(), misfit, misfit_undone, by_images: true, rows_of };
         return Err(Finding::from(mistake).refusal());
     }
     if misfit > suspects.limits.hand_eye_spread {

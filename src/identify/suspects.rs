@@ -21,6 +21,8 @@ pub(super) struct Suspects<'a> {
     pub robot: &'a Robot,
     pub series: &'a [MeasuredSeries],
     pub pairs: &'a [(usize, PosePair)],
+    /// All images by mounting and placement.
+    pub groups: &'a [Vec<(usize, PosePair)>],
     pub limits: &'a Limits,
 }
 

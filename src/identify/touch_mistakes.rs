@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::misread::all_misread;
 use super::mistakes::mistakes_undone;
 use crate::assess::Limits;
-use crate::diagnose::{Mistake, MistakeKind};
+use crate::diagnose::{Mistake, MistakeKind, RowsOf};
 use crate::error::Code;
 use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touch, Touches, closed_form, fit};
 use crate::geom::{Pose, log_so3, rigid_fit};
@@ -95,7 +95,14 @@ pub fn touch_mistake(
     let frame = touches.frame.as_ref().map_or_else(String::new, |frame| format!(" in frame {frame}"));
     let (misfit, misfit_undone) = (found.rms_m, Some(left.rms_m));
     let kind = named(&undone, &left, touches);
-    Some(Mistake { kind, of: format!("touches{frame}"), misfit, misfit_undone, by_images: false })
+    Some(Mistake {
+        kind,
+        of: format!("touches{frame}"),
+        misfit,
+        misfit_undone,
+        by_images: false,
+        rows_of: RowsOf::Readings,
+    })
 }
 
 /// Those that the closed form fits best.
@@ -279,6 +286,7 @@ fn named(undone: &Undone, left: &FrameFit, touches: &Touches) -> MistakeKind {
     MistakeKind::Poses { code, what, remedy }
 }
 
-fn in_metres(place: &Vector3<f64>) -> String {
+/// A place in words.
+pub(super) fn in_metres(place: &Vector3<f64>) -> String {
     format!("({:.4}, {:.4}, {:.4}) m", place.x, place.y, place.z)
 }

@@ -55,7 +55,7 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<Jud
     let limits = &Limits::default();
     let series = in_told_postures(robot, series);
     let (mut adjustment, free, mut starts) = free_poses_of(robot, &series, limits, with_robot_held)?;
-    start_robot(&mut adjustment, &free, StartGiven { series: &series, limits }, &mut starts)?;
+    start_robot(&mut adjustment, &free, StartGiven { series: &series, groups: &[], limits }, &mut starts)?;
     adjustment.tie_to_readings(false);
     let outcome = estimate_components(adjustment, &ComponentOptions::default());
     if outcome.status != Status::Converged {

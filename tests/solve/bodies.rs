@@ -444,3 +444,147 @@ fn zeros_that_are_far_off_are_no_good_result_of_a_tracker() {
     let off = solution.findings.iter().filter(|f| f.code() == Code::ParameterOff && f.fails()).count();
     assert!(off > 0, "{:?}", solution.findings);
 }
+
+/// What an instrument or a body that was moved is refused with: its code, the stop, and by how much.
+fn moved_at(series: MeasuredSeries, chain: &Chain) -> (Code, String, f64) {
+    let said = identify(chain.clone(), &[series], &Options::default()).map(|_| ()).unwrap_err();
+    let stop = said.place.rsplit(' ').next().unwrap().to_owned();
+    (said.code, stop, said.quantities.iter().find(|q| q.name == "distance").unwrap().value)
+}
+
+/// The start goes by a part of the rows: no least squares over both stations is near either.
+#[test]
+fn a_tracker_that_was_set_up_anew_is_named_with_the_stop_by_its_points() {
+    let world = World::new(51, Kind::Points, 40, (3e-5, 0.0), 2e-5);
+    for (from, turn) in [(22, 0.1), (16, 0.3), (20, 1.0)] {
+        let anew = Pose::from_xyz_rpy([0.5 * turn, -0.4 * turn, 0.3 * turn], [0.3 * turn, 0.5 * turn, 0.8 * turn]);
+        let series = changed(&world, |k, pose| *pose = if k >= from { anew * *pose } else { *pose });
+        let (code, stop, distance_m) = moved_at(series, &world.chain);
+        assert_eq!((code, stop), (Code::TrackerDisplaced, format!("{from:03}")));
+        assert!(distance_m > 0.05 * turn, "{distance_m}");
+    }
+}
+
+#[test]
+fn a_reflector_that_was_set_elsewhere_is_named_with_the_stop_by_its_points() {
+    let world = World::new(52, Kind::Points, 40, (3e-5, 0.0), 2e-5);
+    let mut series = world.series.clone();
+    let off = nalgebra::Vector3::new(0.09, -0.05, 0.06);
+    let tracker_from_base = {
+        let placed = world.solve(RobotModel::Rigid);
+        placed.fit.state.instruments[0].inverse()
+    };
+    for seen in &mut series.bodies[24..] {
+        let tip = world.truth.base_from_tip(series.stops[seen.stop].readings.as_ref().unwrap());
+        let BodySeen::Point(at) = &mut seen.seen else { panic!("points") };
+        *at += tracker_from_base.rotation * tip.rotation * off;
+    }
+    let (code, stop, distance_m) = moved_at(series, &world.chain);
+    assert_eq!((code, stop), (Code::TargetDisplaced, "024".to_owned()));
+    assert!((distance_m - off.norm()).abs() < 0.01, "{distance_m}");
+}
+
+/// One wrong pair, the last row beside the first, draws least squares by tens of millimetres.
+#[test]
+fn points_shifted_by_a_row_are_named_whatever_stands_at_the_ends() {
+    for (seed, stops) in [(53, 40), (54, 40), (55, 100)] {
+        let world = World::new(seed, Kind::Points, stops, (3e-5, 0.0), 2e-5);
+        for later in [true, false] {
+            let mut series = world.series.clone();
+            let last = series.bodies.len() - 1;
+            series.bodies.remove(if later { last } else { 0 });
+            series.bodies.iter_mut().for_each(|seen| seen.stop = if later { seen.stop + 1 } else { seen.stop - 1 });
+            let said = identify(world.chain.clone(), &[series], &Options::default()).map(|_| ()).unwrap_err();
+            assert_eq!(said.code, Code::RowsShifted, "{said}");
+            assert!(
+                said.remedy.contains("joints.csv"),
+                "no other instrument says whose rows they are: {}",
+                said.remedy
+            );
+        }
+    }
+}
+
+/// Where poses of another target fit the readings, the rows of the points are wrong, and the other way round.
+#[test]
+fn the_table_that_others_contradict_is_named_where_rows_are_shifted() {
+    let points = World::new(56, Kind::Points, 40, (3e-5, 0.0), 2e-5);
+    let poses = World::new(56, Kind::Poses, 40, (3e-5, 5e-5), 2e-5);
+    let readings = |world: &World| world.series.stops.iter().map(|s| s.readings.clone()).collect::<Vec<_>>();
+    let tracker_from_base = |world: &World| world.solve(RobotModel::Rigid).fit.state.instruments[0].inverse();
+    // Both at the stops of the points, seen in the frame of its tracker.
+    let frame = tracker_from_base(&points);
+    let target = Pose::from_xyz_rpy([0.04, 0.02, 0.1], [0.2, 0.1, -0.3]);
+    let mut both = points.series.clone();
+    for (k, q) in readings(&points).iter().enumerate() {
+        let seen = frame * points.truth.base_from_tip(q.as_ref().unwrap()) * target;
+        let of_pose = robotcal::problem::SeenBody {
+            stop: k,
+            body: "target".into(),
+            seen: BodySeen::Pose(seen),
+            ..poses.series.bodies[k].clone()
+        };
+        both.bodies.push(of_pose);
+    }
+    for (shifted, table) in [("reflector", "points.csv"), ("target", "poses.csv")] {
+        let mut series = both.clone();
+        series.bodies.retain(|seen| seen.body != shifted || seen.stop < 39);
+        series.bodies.iter_mut().filter(|seen| seen.body == shifted).for_each(|seen| seen.stop += 1);
+        let said = identify(points.chain.clone(), &[series], &Options::default()).map(|_| ()).unwrap_err();
+        assert_eq!(said.code, Code::RowsShifted, "{said}");
+        assert!(said.remedy.contains(table), "{}", said.remedy);
+    }
+}
+
+#[test]
+fn points_of_other_places_are_left_out_and_do_not_draw_the_others() {
+    let world = World::new(57, Kind::Points, 40, (3e-5, 0.0), 2e-5);
+    let mut series = world.series.clone();
+    for k in [3, 7, 9, 12] {
+        series.bodies[k].seen = BodySeen::Point(nalgebra::Vector3::zeros());
+    }
+    let solution = identify(world.chain.clone(), &[series], &Options::default()).unwrap();
+    let out: Vec<usize> = (solution.fit.problem.body_measurements.iter().enumerate())
+        .filter(|(_, m)| m.rejected.is_some())
+        .map(|(k, _)| k)
+        .collect();
+    assert_eq!(out, [3, 7, 9, 12]);
+}
+
+#[test]
+fn several_balls_in_another_socket_are_left_out_and_not_those_of_that_socket() {
+    let mut world = World::sockets(5, 4, 15, 5e-5, 2e-5);
+    let wrong = [17, 20, 33, 40, 50];
+    wrong.iter().for_each(|&k| world.series.bodies[k].instrument = "socket 0".into());
+    let solution = world.solve(RobotModel::Rigid);
+    let out: Vec<usize> = (solution.fit.problem.body_measurements.iter().enumerate())
+        .filter(|(_, m)| m.rejected.is_some())
+        .map(|(k, _)| k)
+        .collect();
+    assert_eq!(out, wrong);
+}
+
+#[test]
+fn places_of_two_contacts_that_were_exchanged_are_named() {
+    let mut world = World::sockets(58, 4, 15, 5e-5, 2e-5);
+    let solution = world.solve(RobotModel::Rigid);
+    let fit = &solution.fit;
+    let fixture = Pose::from_xyz_rpy([0.3, 0.2, -0.1], [0.1, 0.2, 0.3]);
+    let place = |name: &str| {
+        let k = fit.problem.instruments.iter().position(|i| i.name == name).unwrap();
+        fixture.transform(&fit.state.instruments[k].translation)
+    };
+    for seen in &mut world.series.bodies {
+        let named = match seen.instrument.as_str() {
+            "socket 0" => "socket 1",
+            "socket 1" => "socket 0",
+            other => other,
+        };
+        seen.seen = BodySeen::Point(place(named));
+        seen.kind = robotcal::problem::InstrumentKind::Places;
+        seen.instrument = "fixture".into();
+    }
+    world.series.lengths.clear();
+    let said = identify(world.chain.clone(), &[world.series], &Options::default()).map(|_| ()).unwrap_err();
+    assert_eq!(said.code, Code::PlaceContradicted, "{said}");
+}
