@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::misread::all_misread;
 use super::mistakes::mistakes_undone;
 use crate::assess::Limits;
-use crate::diagnose::{Mistake, MistakeKind, RowsOf};
+use crate::diagnose::{Finding, Mistake, MistakeKind, RowsOf};
 use crate::error::Code;
 use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touch, Touches, closed_form, fit};
 use crate::geom::{Pose, log_so3, rigid_fit};
@@ -52,7 +52,8 @@ enum What {
     },
 }
 
-/// The mistake that explains why touches scatter; `None` where they do not, or none of them does.
+/// The mistake that explains why touches scatter; `None` where they do not, or none of them does. Where none does alone, it is looked for beside
+/// touches that fit least, one after the other, as long as these are few.
 pub fn touch_mistake(
     robot: &KnownRobot,
     touches: &Touches,
@@ -62,6 +63,81 @@ pub fn touch_mistake(
     if found.contradiction(limits) <= limits.touch_factor {
         return None;
     }
+    let most = (limits.share_of_images_left_out * touches.all.len() as f64) as usize;
+    let (mut rest, mut fitted, mut beside) = (touches.clone(), found.clone(), Vec::new());
+    loop {
+        if let Some((left, undone)) = explained(robot, &rest, given, (&fitted, limits)) {
+            let kind = named(&undone, &left, &rest);
+            // Of shifted rows one at the end has no partner.
+            if !matches!(kind, MistakeKind::Rows { .. }) {
+                let judged = undone.touches.all.iter().zip(&left.judged);
+                beside.extend(judged.filter(|(_, judged)| judged.left_out).map(|(touch, _)| touch.stop.clone()));
+            }
+            return Some(mistake(touches, kind, (found.rms_m, left.rms_m), &beside));
+        }
+        let out = fit_least(robot, &rest, given, &fitted)?;
+        beside.extend(out.iter().map(|k| rest.all[*k].stop.clone()));
+        if beside.len() > most {
+            return None;
+        }
+        rest = without(&rest, &out);
+        fitted = fit(robot, &rest, given, limits).ok()?;
+        let left = fitted.contradiction(limits);
+        if left <= limits.touch_factor && left < limits.mistake_explains * found.contradiction(limits) {
+            let kind = MistakeKind::Poses {
+                code: Code::PlaceContradicted,
+                what: format!("the touches at {} were of other places than is said", beside.join(", ")),
+                remedy: "correct their rows in contacts.csv, or leave them out".to_owned(),
+            };
+            return Some(mistake(touches, kind, (found.rms_m, fitted.rms_m), &[]));
+        }
+    }
+}
+
+/// With the stops that fit no more beside it.
+fn mistake(touches: &Touches, kind: MistakeKind, (misfit, left): (f64, f64), beside: &[String]) -> Mistake {
+    let frame = touches.frame.as_ref().map_or_else(String::new, |frame| format!(" in frame {frame}"));
+    let alone = Mistake {
+        kind,
+        of: format!("touches{frame}"),
+        misfit,
+        misfit_undone: Some(left),
+        by_images: false,
+        rows_of: RowsOf::Readings,
+    };
+    if beside.is_empty() {
+        return alone;
+    }
+    let found = Finding::from(alone.clone());
+    let what = format!("{}; beside it {} fits no place that is said", found.seen(), beside.join(", "));
+    let kind = MistakeKind::Poses { code: found.code(), what, remedy: found.remedy() };
+    Mistake { kind, ..alone }
+}
+
+/// The touches that the fit left out, else that without which the others fit best.
+fn fit_least(robot: &KnownRobot, touches: &Touches, given: &Given, fitted: &FrameFit) -> Option<Vec<usize>> {
+    let all = 0..touches.all.len();
+    let out: Vec<usize> = all.clone().filter(|&k| fitted.judged[k].left_out).collect();
+    if !out.is_empty() {
+        return Some(out);
+    }
+    let left = |k: usize| Some((closed_form(robot, &without(touches, &[k]), given)?.0, k));
+    let least = all.filter_map(left).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(vec![least.1])
+}
+
+fn without(touches: &Touches, out: &[usize]) -> Touches {
+    let rest = touches.all.iter().enumerate().filter(|(k, _)| !out.contains(k));
+    Touches { all: rest.map(|(_, touch)| touch.clone()).collect(), ..touches.clone() }
+}
+
+/// The mistake that explains most, and what it leaves.
+fn explained(
+    robot: &KnownRobot,
+    touches: &Touches,
+    given: &Given,
+    (found, limits): (&FrameFit, &Limits),
+) -> Option<(FrameFit, Undone)> {
     let fewest = limits.fewest_touches;
     let from = fewest..(touches.postures.len() + 1).saturating_sub(fewest);
     let with_given = |(touches, what): (Touches, What)| Undone { touches, given: *given, what };
@@ -90,19 +166,7 @@ pub fn touch_mistake(
             && fit.rms_m < limits.touch_sigma_m
     };
     let tried = |undone: Undone| fitted(&undone).filter(explains).map(|fit| (fit, undone));
-    let (left, undone) =
-        all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a, limits), rank(b, limits)))?;
-    let frame = touches.frame.as_ref().map_or_else(String::new, |frame| format!(" in frame {frame}"));
-    let (misfit, misfit_undone) = (found.rms_m, Some(left.rms_m));
-    let kind = named(&undone, &left, touches);
-    Some(Mistake {
-        kind,
-        of: format!("touches{frame}"),
-        misfit,
-        misfit_undone,
-        by_images: false,
-        rows_of: RowsOf::Readings,
-    })
+    all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a, limits), rank(b, limits)))
 }
 
 /// Those that the closed form fits best.

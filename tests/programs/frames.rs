@@ -635,6 +635,10 @@ fn usual_mistakes_in_touches_are_named() {
         is(named(&|t| places(t, 0..16, &|p| *p /= metres)), Code::MeasuredUnit, name);
     }
     is(named(&|t| t.all[6].seen = t.all[0].seen), Code::PlaceContradicted, "t06");
+    let two = |t: &mut Touches| [(6, 0), (11, 3)].iter().for_each(|(k, of)| t.all[*k].seen = t.all[*of].seen);
+    for stop in ["t06", "t11"] {
+        is(named(&two), Code::PlaceContradicted, stop);
+    }
     is(named(&|t| places(t, 7..16, &|p| p.x += 1e-3)), Code::WorkDisplaced, "from t07 on");
     let bent = Toucher { tool: Vector3::from(TOOL) + Vector3::new(1e-3, 0.0, 0.0), ..toucher };
     let bent = bent.places(&q, "fixture", &mut ChaCha8Rng::seed_from_u64(32));
