@@ -173,6 +173,7 @@ codes! {
         ImageTwice "image_twice" "two images have one name",
         ImagesMissing "images_missing" "images are needed, and there are none",
         ObservationsMissing "observations_missing" "images of joints.csv have no observations",
+        TargetLost "target_lost" "rows of a tracker at (0, 0, 0) are no measurements: they are left out",
         MeasurementsTooFew "measurements_too_few" "a body on the tip was measured at too few stops",
         MarkerUnknown "marker_unknown" "the plate has no such marker",
     }

@@ -156,7 +156,7 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
         Source::Recording(recording)
     } else {
         (stops, controller) = stops_of(folder, &manifest, &manifest_path, &mut inputs)?;
-        spatial = SpatialFiles::read(folder, &stops, &mut inputs)?;
+        spatial = SpatialFiles::read(folder, &stops, &mut inputs, &mut notices)?;
         if by_cameras {
             Source::NoImages
         } else if use_observations {

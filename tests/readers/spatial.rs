@@ -158,3 +158,16 @@ fn nothing_measured_is_no_series() {
     let error = read(folder.path()).unwrap_err();
     assert_says(&error, Code::SettingMissing, &["camera_mount"]);
 }
+
+/// A tracker that lost the beam writes its own origin; a device with its frame in the target is there once.
+#[test]
+fn rows_of_a_lost_target_are_left_out_with_their_lines() {
+    let head = "stop,target,x_m,y_m,z_m\n";
+    let lost = "left/0,ball,0,0,0\nleft/0,cone,1,2,3\nleft/1,ball,0.0,0,-0.0\nleft/1,cone,1,2,4\n";
+    let read = series(&[("points.csv", &format!("{head}{lost}"))]);
+    assert_eq!(read.spatial.points.iter().map(|p| p.line).collect::<Vec<_>>(), [3, 5]);
+    let said: Vec<_> = read.notices.iter().filter(|n| n.code == Code::TargetLost).collect();
+    assert!(matches!(said[..], [notice] if notice.what.contains("lines 2, 4")), "{said:?}");
+    let once = series(&[("points.csv", &format!("{head}left/0,ball,0,0,0\nleft/1,ball,1,2,4\n"))]);
+    assert_eq!((once.spatial.points.len(), once.notices.len()), (2, 0));
+}
