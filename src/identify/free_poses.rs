@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Matrix6, Vector2};
 
 use super::build::build;
+use super::exchanged_counts::with_counts_exchanged;
 use super::start_verdict::{StartReached, StartVerdict};
 use super::stated::{CameraStart, camera_starts};
 use crate::assess::Limits;
@@ -141,7 +142,9 @@ pub fn adjust_free_poses(
     let (adjustment, free) = of_images_alone(adjustment, limits, |adjustment| {
         let homographies = fit_homographies(adjustment)?;
         for (camera, start) in starts.iter().enumerate() {
-            adjustment.state = start_camera(adjustment, camera, &homographies, start, &mut verdicts)?;
+            let started = start_camera(adjustment, camera, &homographies, start, &mut verdicts);
+            let explained = |e| with_counts_exchanged(e, &adjustment.problem, camera, limits.mistake_explains);
+            adjustment.state = started.map_err(explained)?;
         }
         Ok(())
     })?;

@@ -19,6 +19,7 @@ mod detections;
 mod dry_run;
 mod estimator;
 mod evidence;
+mod exchanged_counts;
 mod free_poses;
 mod in_words;
 mod joint;

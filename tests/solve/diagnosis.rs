@@ -319,3 +319,14 @@ fn views_straight_at_the_plate_do_not_determine_the_camera_and_some_tilted_ones_
     let sigma = solution.fit.covariance.sigma(column);
     assert!((found - true_focal).abs() < 4.0 * sigma && sigma < 1e-3 * true_focal, "{found} +- {sigma}: {true_focal}");
 }
+
+/// Ids that are read along the wrong side of the plate look like a mirror, and fit a plane with the two counts exchanged.
+#[test]
+fn columns_and_rows_of_a_plate_that_were_exchanged_are_named() {
+    let chain = chain();
+    let request = WorldRequest { plate: Plate::lattice(PlateKind::Points, 11, 8, 0.025, 0.05e-3), ..request(&chain) };
+    let mut series = measured(&series(&request).unwrap(), &chain);
+    series.plate = Plate::lattice(PlateKind::Points, 8, 11, 0.025, 0.05e-3);
+    let said = identify(chain, &[series], &Options::default()).map(|_| ()).unwrap_err();
+    assert_eq!((number(&said, "columns"), number(&said, "rows")), (11.0, 8.0), "{said}");
+}
