@@ -16,6 +16,8 @@ pub struct ExchangedReadings {
     pub images: Vec<String>,
     /// How well the worst of them does, m + rad.
     pub misfit: f64,
+    /// True where something else that was measured at each of these stops fits its readings: then the images are exchanged.
+    pub others_fit: bool,
 }
 
 /// Every circle once, and once for all cameras that saw its stops.
@@ -28,13 +30,20 @@ pub(super) fn check(adjustment: &Adjustment) -> Vec<ExchangedReadings> {
             continue;
         }
         let of_circle = |i: &&Image| circle.iter().any(|&(k, _)| problem.images[k].stop == i.stop);
+        let is_measured = |&(k, _): &(usize, f64)| others_fit(problem, problem.images[k].stop);
         found.push(ExchangedReadings {
+            others_fit: circle.iter().all(is_measured),
             circle: circle.iter().map(|&(i, _)| problem.images[i].name.clone()).collect(),
             images: problem.images.iter().filter(of_circle).map(|i| i.name.clone()).collect(),
             misfit: circle.iter().map(|&(_, misfit)| misfit).fold(0.0, f64::max),
         });
     }
     found
+}
+
+/// True where an image or a measurement of a body is in use at a stop.
+fn others_fit(problem: &Problem, stop: usize) -> bool {
+    problem.used().any(|(_, image)| image.stop == stop) || problem.used_bodies().any(|(_, m)| m.stop == stop)
 }
 
 /// Wrongly paired images from one to the one whose readings it fits, with how well, until the first is met again.
@@ -76,7 +85,7 @@ impl Kind for ExchangedReadings {
     }
 
     fn place(&self) -> String {
-        "joints.csv".into()
+        if self.others_fit { "images" } else { "joints.csv" }.into()
     }
 
     fn seen(&self) -> String {
@@ -93,6 +102,9 @@ impl Kind for ExchangedReadings {
     }
 
     fn remedy(&self) -> String {
-        "write these readings beside the images that they fit, and all of them are used".into()
+        match self.others_fit {
+            true => "exchange these images by their names (where there is images.csv, there), and leave joints.csv as it is, which what else was measured at these stops fits".into(),
+            false => "write these readings beside the images that they fit, and all of them are used".into(),
+        }
     }
 }

@@ -2,8 +2,9 @@
 
 use robotcal::assess::WorkspacePoint;
 use robotcal::diagnose::Finding;
+use robotcal::geom::Pose;
 use robotcal::identify::{JointNoise, Options, RobotModel, identify};
-use robotcal::problem::{ImageRejection, MeasuredSeries};
+use robotcal::problem::{BodySeen, ImageRejection, InstrumentKind, MeasuredSeries, MeasuredStop, SeenBody};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{WorldRequest, series};
 use robotcal::study::measured;
@@ -251,6 +252,48 @@ fn rows_that_were_exchanged_are_named_with_one_another() {
     assert_eq!(left_out_and_named(2e-5, &[(2, 7), (7, 11), (11, 2)]), (vec![2, 7, 11], vec![vec![2, 11, 7]]));
     // Readings that are nobody's.
     assert_eq!(left_out_and_named(2e-5, &[(2, 7)]), (vec![2], vec![]));
+}
+
+/// 24 images beside which a tracker saw the tip, with the images that `of` gives to each stop by its place.
+fn beside_a_tracker(of: impl Fn(usize) -> usize) -> Result<Vec<Finding>, Error> {
+    let chain = chain();
+    let world = WorldRequest { images: 24, ..request(&chain) };
+    let mut series = measured(&series(&world).unwrap(), &chain);
+    let robot = identify(chain.clone(), std::slice::from_ref(&series), &Options::default()).unwrap().exported_robot();
+    let tracker_from_base = Pose::from_xyz_rpy([1.5, -0.8, 0.4], [0.3, -0.2, 1.1]);
+    let tip_from_target = Pose::from_xyz_rpy([0.05, 0.02, 0.08], [0.2, 0.4, -0.1]);
+    let target = |(k, stop): (usize, &MeasuredStop)| SeenBody {
+        stop: k,
+        instrument: "tracker".into(),
+        kind: InstrumentKind::Tracker,
+        body: "target".into(),
+        seen: BodySeen::Pose(
+            tracker_from_base * robot.base_from_tip(stop.readings.as_ref().unwrap()) * tip_from_target,
+        ),
+        sigma_m: 1e-4,
+        sigma_rad: 2e-4,
+    };
+    series.bodies = series.stops.iter().enumerate().map(target).collect();
+    let seen: Vec<_> = series.stops.iter().map(|s| s.observations.clone()).collect();
+    series.stops.iter_mut().enumerate().for_each(|(k, stop)| stop.observations = seen[of(k) % 24].clone());
+    identify(chain, &[series], &Options::default()).map(|solution| solution.findings)
+}
+
+#[test]
+fn images_are_blamed_for_their_rows_where_a_tracker_fits_the_readings() {
+    let exchanged = |k| match k {
+        3 => 8,
+        8 => 3,
+        k => k,
+    };
+    let findings = beside_a_tracker(exchanged).unwrap();
+    let found: Vec<_> = (findings.iter())
+        .filter_map(|f| if let Finding::ExchangedReadings(f) = f { Some((f.circle.len(), f.others_fit)) } else { None })
+        .collect();
+    assert_eq!(found, [(2, true)], "{findings:?}");
+    let said = beside_a_tracker(|k| k + 1).map(|_| ()).unwrap_err();
+    assert_eq!(said.code, Code::RowsShifted, "{said}");
+    assert!(said.remedy.contains("observations.csv"), "{}", said.remedy);
 }
 
 #[test]
