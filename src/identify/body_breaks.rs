@@ -1,5 +1,5 @@
-//! When measurements of a body fit in two parts: from some stop on, or in a series, its instrument stands elsewhere, or the body sits elsewhere on the
-//! tip, by so much that no fit of all is of any use.
+//! When measurements of a body fit in two parts: from some stop on, or in a series, its instrument stands elsewhere, or the body sits elsewhere on
+//! the tip, by so much that no fit of all is of any use.
 
 use std::ops::Range;
 

@@ -7,8 +7,8 @@ use crate::init::{Homography, upper_median};
 use crate::problem::{Image, Problem};
 use crate::series::Plate;
 
-/// Says so beside what was seen of a camera, where its images fit a plane with the two exchanged far better than as the plate is described: by less than
-/// `share` of the misfit.
+/// Says so beside what was seen of a camera, where its images fit a plane with the two exchanged far better than as the plate is described: with
+/// less than `share` of the misfit.
 pub(super) fn with_counts_exchanged(error: Error, problem: &Problem, camera: usize, share: f64) -> Error {
     let own = || problem.used().filter(|(_, image)| image.camera == camera).map(|(_, image)| image);
     let Some(plate) = own().next().map(|image| &problem.plates[image.plate]) else { return error };

@@ -72,8 +72,9 @@ pub(super) fn agreeing_in_part(points: &[PointAt], bound: f64) -> Option<Placed>
 
 /// From the nearest half, where some disagree, then from all that agree with these: others would spoil the start for all.
 fn without_others(points: &[PointAt], placed: Placed) -> Placed {
-    let disagrees = |distance: &f64| *distance > DISAGREES * usual_distance(points, &placed);
-    if points.len() < MANY_POINTS || !distances(points, &placed).iter().any(disagrees) {
+    let usual = usual_distance(points, &placed);
+    let agrees = |distance: f64| distance <= DISAGREES * usual;
+    if points.len() < MANY_POINTS || distances(points, &placed).into_iter().all(agrees) {
         return placed;
     }
     let mut found = placed;
@@ -83,7 +84,7 @@ fn without_others(points: &[PointAt], placed: Placed) -> Placed {
             points.iter().zip(distances(points, &found)).filter(|(_, d)| *d <= bound).map(|(p, _)| *p).collect();
         found = alternating(&near, found.0.rotation);
     }
-    if usual_distance(points, &found) < usual_distance(points, &placed) { found } else { placed }
+    if usual_distance(points, &found) < usual { found } else { placed }
 }
 
 /// Frame and body that points fit best.
