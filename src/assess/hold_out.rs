@@ -59,23 +59,24 @@ const NOMINAL_POSE_ERROR: f64 = 3e-3;
 const MOST_STOPS: usize = 2000;
 
 /// Predicts every image on the robot by models that have not seen it: of what is calibrated by `fitted`, from the images that are left, which is
-/// [`refitted_near`] for the joint fit. Also returns what was fitted, fold by fold.
-pub fn hold_out(fit: LinearProblem, fitted: &Refit, limits: &Limits) -> Option<(Accuracy, Vec<State>)> {
+/// [`refitted_near`] for the joint fit. Also returns the errors of what is calibrated.
+pub fn hold_out(fit: LinearProblem, fitted: &Refit, limits: &Limits) -> Option<(Accuracy, Vec<(usize, ImageError)>)> {
     let _stage = stage("hold-out");
     let some = fit.some_stops(MOST_STOPS, MOST_STOPS);
     let fit = some.as_ref().map_or(fit, LinearisedAdjustment::linear);
     let problem = &fit.adjustment.problem;
     let folds = folds(problem, limits)?;
     let nominal = nominal(fit.adjustment);
-    let (nominal, _) = predictions(nominal.linear()?, &folds, &joint)?;
-    let (calibrated, states) = predictions(fit, &folds, fitted)?;
+    let nominal = predictions(nominal.linear()?, &folds, &joint)?;
+    let calibrated = predictions(fit, &folds, fitted)?;
     let mut per_image_mm = vec![None; problem.images.len()];
     for ((i, a), (_, b)) in nominal.iter().zip(&calibrated) {
         per_image_mm[*i] = Some([a.mm(), b.mm()]);
     }
-    let [nominal, calibrated] = [summary(&nominal), summary(&calibrated)];
+    let [nominal, of_calibrated] = [summary(&nominal), summary(&calibrated)];
     let per_body_mm = Vec::new();
-    Some((Accuracy { nominal, calibrated, per_image_mm, per_body_mm, folds: folds.len() }, states))
+    let accuracy = Accuracy { nominal, calibrated: of_calibrated, per_image_mm, per_body_mm, folds: folds.len() };
+    Some((accuracy, calibrated))
 }
 
 /// Stops that are enough for what is fitted beside the nominal robot.
@@ -114,7 +115,7 @@ fn of_nominal(fit: &Adjustment) -> Adjustment {
 
 /// Error of every image on the robot, predicted by fits of the free columns to the images of the other folds; `None` for too few.
 pub fn hold_out_images(fit: LinearProblem, limits: &Limits) -> Option<Vec<(usize, ImageError)>> {
-    predictions(fit, &folds(&fit.adjustment.problem, limits)?, &joint).map(|(errors, _)| errors)
+    predictions(fit, &folds(&fit.adjustment.problem, limits)?, &joint)
 }
 
 fn joint(left: LinearisedAdjustment) -> Option<State> {
@@ -225,10 +226,8 @@ fn along_the_workspace(Adjustment { problem, state }: &Adjustment, postures: Vec
     placed.into_iter().map(|(_, posture)| posture).collect()
 }
 
-/// Error of every held-out image with its index, and the state of every fold.
-type Predictions = (Vec<(usize, ImageError)>, Vec<State>);
-
-fn predictions(fit: LinearProblem, folds: &[Vec<usize>], fitted: &Refit) -> Option<Predictions> {
+/// Error of every held-out image, with its index.
+fn predictions(fit: LinearProblem, folds: &[Vec<usize>], fitted: &Refit) -> Option<Vec<(usize, ImageError)>> {
     let problem = &fit.adjustment.problem;
     let of_fold = |held: &Vec<usize>| fitted(fit.without_images(held));
     let states: Vec<State> =
@@ -238,7 +237,7 @@ fn predictions(fit: LinearProblem, folds: &[Vec<usize>], fitted: &Refit) -> Opti
     let predicted = held.par_iter().map(|(i, fitted)| Some((*i, predict_image(fit.adjustment, fitted, *i)?)));
     let mut errors: Vec<(usize, ImageError)> = predicted.collect::<Option<_>>()?;
     errors.sort_by_key(|(i, _)| *i);
-    Some((errors, states))
+    Some(errors)
 }
 
 /// Bounds of the fit of a fold: no unknown is off by more than a tenth of its sigma, of very many stops a little more.
@@ -261,11 +260,23 @@ pub fn refitted_near(start: LinearisedAdjustment) -> State {
 /// Error of an image that `state` was not fitted to, predicted from its joint readings alone; `None` off the robot, or where
 /// its markers do not give a pose, which is near to that of the adjustment.
 pub fn predict_image(near: &Adjustment, state: &State, image: usize) -> Option<ImageError> {
-    let (problem, start) = (&near.problem, near.camera_from_plate(image)?);
+    error_of_predicted(near, state, image, &seen_pose(near, state, image)?)
+}
+
+/// Where an image by itself says that its camera was, with camera and plate of `state`; `None` where its markers do not give a pose, which is near
+/// to that of the adjustment.
+pub fn seen_pose(near: &Adjustment, state: &State, image: usize) -> Option<Pose> {
+    let start = near.camera_from_plate(image)?;
+    let image = &near.problem.images[image];
+    resect_near(image, state, &start, &Weighting::of(&near.problem, image))
+}
+
+/// As [`predict_image`], where the image by itself says that its camera was.
+pub fn error_of_predicted(near: &Adjustment, state: &State, image: usize, seen: &Pose) -> Option<ImageError> {
+    let problem = &near.problem;
     let (image, posture) = (&problem.images[image], problem.posture(image)?);
     let predicted = state.camera_from_plate(image, TakenFrom::exact(posture))?;
-    let seen = resect_near(image, state, &start, &Weighting::of(problem, image))?;
-    Some(image_error(image, state, &predicted, &seen))
+    Some(image_error(image, state, &predicted, seen))
 }
 
 fn image_error(image: &Image, state: &State, predicted: &Pose, seen: &Pose) -> ImageError {

@@ -4,12 +4,12 @@ use std::collections::HashSet;
 
 use super::hold_out::{Accuracy, Errors, dealt, nominal, refitted_near};
 use super::limits::Limits;
-use crate::problem::{Problem, State, TakenFrom};
+use crate::problem::{Problem, TakenFrom};
 use crate::solve::{LinearProblem, side_by_side};
 use crate::stage::stage;
 
-/// Predicts what was measured of bodies by models that have not seen the stop. Also returns the states, fold by fold; `None` for too few stops.
-pub fn hold_out_bodies(fit: LinearProblem, limits: &Limits) -> Option<(Accuracy, Vec<State>)> {
+/// Predicts what was measured of bodies by models that have not seen the stop; `None` for too few stops.
+pub fn hold_out_bodies(fit: LinearProblem, limits: &Limits) -> Option<Accuracy> {
     let _stage = stage("hold-out");
     let problem = &fit.adjustment.problem;
     let stops: Vec<usize> = {
@@ -22,22 +22,19 @@ pub fn hold_out_bodies(fit: LinearProblem, limits: &Limits) -> Option<(Accuracy,
     }
     let folds = dealt(stops.into_iter().map(|stop| vec![stop]).collect());
     let nominal = nominal(fit.adjustment);
-    let (before, _) = predictions(problem, nominal.linear()?, &folds)?;
-    let (after, states) = predictions(problem, fit, &folds)?;
+    let before = predictions(problem, nominal.linear()?, &folds)?;
+    let after = predictions(problem, fit, &folds)?;
     let mut per_body_mm = vec![None; problem.body_measurements.len()];
     for ((k, a), (_, b)) in before.iter().zip(&after) {
         per_body_mm[*k] = Some([*a, *b]);
     }
     let [nominal, calibrated] = [summary(&before), summary(&after)];
-    let accuracy = Accuracy { nominal, calibrated, per_image_mm: Vec::new(), per_body_mm, folds: folds.len() };
-    Some((accuracy, states))
+    Some(Accuracy { nominal, calibrated, per_image_mm: Vec::new(), per_body_mm, folds: folds.len() })
 }
 
-/// Distance of what was measured from what is predicted, mm, with the index of the measurement; ascending.
-type Predictions = (Vec<(usize, f64)>, Vec<State>);
-
-/// Of all that is in use in a problem, by fits of it, or of some of it.
-fn predictions(problem: &Problem, fit: LinearProblem, folds: &[Vec<usize>]) -> Option<Predictions> {
+/// Distance of what was measured from what is predicted, mm, with the index of the measurement, ascending: of all that is in use in a problem, by
+/// fits of it, or of some of it.
+fn predictions(problem: &Problem, fit: LinearProblem, folds: &[Vec<usize>]) -> Option<Vec<(usize, f64)>> {
     let states = side_by_side(problem, folds, |_, held| refitted_near(fit.without_bodies_at(held)));
     let mut errors = Vec::new();
     for (held, state) in folds.iter().zip(&states) {
@@ -49,7 +46,7 @@ fn predictions(problem: &Problem, fit: LinearProblem, folds: &[Vec<usize>]) -> O
         }
     }
     errors.sort_by_key(|(k, _)| *k);
-    Some((errors, states))
+    Some(errors)
 }
 
 fn summary(errors: &[(usize, f64)]) -> Errors {

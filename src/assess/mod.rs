@@ -31,8 +31,8 @@ pub use alone::urdf_alone;
 pub use clustered::{Clustered, RootInformation, StopInformation, clustered_covariance};
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
-    Accuracy, Errors, ImageError, Refit, cluster_of_images, folds, hold_out, hold_out_images, predict_image, refitted,
-    refitted_near, regions,
+    Accuracy, Errors, ImageError, Refit, cluster_of_images, error_of_predicted, folds, hold_out, hold_out_images,
+    predict_image, refitted, refitted_near, regions, seen_pose,
 };
 pub use hold_out_bodies::hold_out_bodies;
 pub use identifiability::{

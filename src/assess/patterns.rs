@@ -13,7 +13,7 @@ use crate::fit::Fit;
 use crate::linalg::symmetric_eigen;
 use crate::model::camera::Lens;
 use crate::problem::{Adjustment, Equations, PlateShape, Step};
-use crate::solve::{LinearImage, LinearProblem, Response, Singular};
+use crate::solve::{LinearImage, Response, Singular};
 
 /// Share of the information of a scaled direction below which the fit absorbs it.
 const ABSORBED: f64 = 1e-8;
@@ -143,7 +143,7 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
         return Ok(Vec::new());
     }
     let groups = groups(fit);
-    let response = response(linear, &groups)?;
+    let response = response(fit, &groups)?;
     let effects = Effects::of(fit, limits);
     let (n, squares) = (response.equations as f64, response.squares);
     let points: usize = linear.images().map(|i| i.terms.residuals.len()).sum();
@@ -183,12 +183,12 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
 ///
 /// # Errors
 /// Normal equations that are singular.
-pub fn camera_shows_pattern(linear: LinearProblem, camera: usize, limits: &Limits) -> Result<bool, Singular> {
-    if linear.images().len() == 0 {
+pub fn camera_shows_pattern(fit: &Fit, camera: usize, limits: &Limits) -> Result<bool, Singular> {
+    if fit.linear().images().len() == 0 {
         return Ok(false);
     }
     let groups = placed(Pattern::OF_CAMERA.into_iter().map(|p| (p, Bearer::Camera(camera))));
-    let response = response(linear, &groups)?;
+    let response = response(fit, &groups)?;
     let is_found = |g: &Group| {
         let (_, statistic, degrees) = solved(&response, g);
         deviate(statistic, degrees) > limits.pattern_sigmas
@@ -227,9 +227,9 @@ fn placed(patterns: impl Iterator<Item = (Pattern, Bearer)>) -> Vec<Group> {
     patterns.map(place).collect()
 }
 
-fn response(linear: LinearProblem, groups: &[Group]) -> Result<Response, Singular> {
+fn response(fit: &Fit, groups: &[Group]) -> Result<Response, Singular> {
     let count = groups.iter().map(|g| g.pattern.columns()).sum();
-    linear.response(count, |image, equations| columns(linear.adjustment, groups, image, equations, count))
+    fit.response(count, |image, equations| columns(fit, groups, image, equations, count))
 }
 
 /// Columns of an image, whitened, equations x columns.

@@ -1,15 +1,24 @@
 //! Laplace's approximation of the evidence of a model (D. MacKay, *Bayesian interpolation*, 1992).
 
-use crate::linalg::SymmetricFactor;
 use crate::problem::Family;
-use crate::solve::{Elimination, LinearProblem, System};
+use crate::solve::{Elimination, Fit, LinearProblem, System};
 
 /// `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what models of the same data share, with the whole information `N`
 /// (dense columns, latents and markers) at the optimum and the priors of columns and of what is latent at stops, and what holding directions of a family adds to the density of its prior; `None` where it
 /// is not finite.
 pub fn log_evidence(linear: LinearProblem) -> Option<f64> {
     let system = System::with(Elimination::cheaper(linear), linear, 0.0);
-    let reduced = SymmetricFactor::new(&system.information).ok()?.log_determinant();
+    let reduced = system.factor(linear).ok()?.log_determinant();
+    of_determinant(linear, &system, reduced)
+}
+
+/// As [`log_evidence`], of a fit whose covariance is at hand.
+pub fn log_evidence_of_fit(fit: &Fit) -> Option<f64> {
+    of_determinant(fit.linear(), &fit.covariance.system, fit.covariance.log_determinant)
+}
+
+/// With the logarithm of the determinant of the information of a system.
+fn of_determinant(linear: LinearProblem, system: &System, reduced: f64) -> Option<f64> {
     let eliminated = system.log_determinant_of_eliminated(linear);
     let distances = system.log_determinant_of_distances();
     let priors: f64 = (linear.adjustment.problem.layout.columns.iter())

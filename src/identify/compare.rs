@@ -9,8 +9,8 @@ use super::options::JointNoise;
 use super::solution::Solution;
 use super::two_stage::{PoseStage, fit_joint, fit_poses};
 use crate::assess::{
-    ImageError, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, flange_error_m, folds, predict_image,
-    refitted_near, regions, root_mean_square,
+    ImageError, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, error_of_predicted, flange_error_m,
+    folds, refitted_near, regions, root_mean_square, seen_pose,
 };
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
@@ -28,8 +28,8 @@ const SOME_STOPS: usize = 250;
 /// soon a fifth of the whole, and it is the joint fit up to terms of second order.
 const MOST_TOGETHER: usize = 80;
 
-/// What is compared, and the joint fits of its folds where they are known: some of very many stops.
-fn compared(solution: &Solution) -> (Cow<'_, Adjustment>, &[State]) {
+/// What is compared, and the errors of the joint fit where they are known: some of very many stops.
+fn compared(solution: &Solution) -> (Cow<'_, Adjustment>, &[(usize, ImageError)]) {
     let joint = solution.joint_fit();
     match joint.some_stops(MANY_STOPS, SOME_STOPS) {
         Some(some) => (Cow::Owned(some), &[]),
@@ -117,21 +117,20 @@ fn rows(
     estimators.iter().enumerate().map(row).collect()
 }
 
-/// What every estimator makes of the observations in use, some of those whose stand-alone poses are `solved`; `None` for one that has no solution.
-/// That of the joint fit may be `known`.
+/// What every estimator makes of the observations that are `left`, some of those whose stand-alone poses are `solved`; `None` for one that has no
+/// solution. That of the joint fit is found by `joint`.
 fn fitted(
-    left: LinearisedAdjustment,
+    left: &Adjustment,
     solved: Option<&LinearisedAdjustment>,
     estimators: &[Estimator],
-    known: Option<&State>,
+    joint: impl Fn() -> Option<State>,
 ) -> Vec<Option<State>> {
-    let start = &left.adjustment;
-    let stage = solved.and_then(|solved| PoseStage::of_left(solved, start, estimators));
+    let stage = solved.and_then(|solved| PoseStage::of_left(solved, left, estimators));
     let noise = JointNoise::Estimated;
     let found = |estimator: &Estimator| match estimator {
-        Estimator::Joint => Some(known.cloned().unwrap_or_else(|| refitted_near(left.clone()))),
-        Estimator::HardJoint => fit_joint(start, *estimator, noise).map(|(_, found)| found.state),
-        _ => Some(fit_poses(start, stage.as_ref()?, *estimator, noise)?.state),
+        Estimator::Joint => joint(),
+        Estimator::HardJoint => fit_joint(left, *estimator, noise).map(|(_, found)| found.state),
+        _ => Some(fit_poses(left, stage.as_ref()?, *estimator, noise)?.state),
     };
     estimators.iter().map(found).collect()
 }
@@ -139,24 +138,56 @@ fn fitted(
 /// Error of every held-out image, with its index, by every estimator; `None` where an estimator has no solution for a fold.
 type Errors = Vec<(usize, Vec<Option<ImageError>>)>;
 
-/// Errors by some estimators; of the joint fit, the states of the folds may be `known`.
+/// Errors by some estimators; those of the joint fit may be `known`.
 fn held_out(
     joint: &Adjustment,
     folds: &[Vec<usize>],
-    (estimators, known): (&[Estimator], &[State]),
+    (estimators, known): (&[Estimator], &[(usize, ImageError)]),
     tick: &(dyn Fn() + Sync),
 ) -> Errors {
-    let (solved, whole) = (PoseStage::solved(joint), LinearisedAdjustment::of(joint.clone()));
-    let of_fold = |k: usize, fold: &Vec<usize>| -> Errors {
-        let Some(whole) = &whole else { return Vec::new() };
-        let left = whole.linear().without_images(fold);
-        let found = fitted(left, solved.as_ref(), estimators, known.get(k));
-        let by_all = |&i: &usize| found.iter().map(|state| predict_image(joint, state.as_ref()?, i)).collect();
-        let errors = fold.iter().map(|i| (*i, by_all(i))).collect();
+    let solved = PoseStage::solved(joint);
+    let whole = if known.is_empty() { LinearisedAdjustment::of(joint.clone()) } else { None };
+    let of_fold = |_: usize, fold: &Vec<usize>| -> Errors {
+        let refit = || Some(refitted_near(whole.as_ref()?.linear().without_images(fold)));
+        let found = fitted(&joint.without_images(fold), solved.as_ref(), estimators, refit);
+        let alike = same_cameras(&found);
+        let errors = fold.iter().map(|i| (*i, errors_of(joint, *i, (&found, &alike)))).collect();
         tick();
         errors
     };
-    side_by_side(&joint.problem, folds, of_fold).concat()
+    let mut errors = side_by_side(&joint.problem, folds, of_fold).concat();
+    let of_joint = estimators.iter().position(|e| *e == Estimator::Joint).filter(|_| !known.is_empty());
+    for (i, own) in &mut errors {
+        let at = known.binary_search_by_key(i, |(image, _)| *image).ok();
+        if let (Some(of_joint), Some(at)) = (of_joint, at) {
+            own[of_joint] = Some(known[at].1);
+        }
+    }
+    errors
+}
+
+/// The first of some states that has the cameras and plates of each: an image by itself says the same by both.
+fn same_cameras(states: &[Option<State>]) -> Vec<usize> {
+    let parts = |k: usize| states[k].as_ref().map(|state| (&state.cameras, &state.plates));
+    (0..states.len()).map(|k| (0..k).find(|first| parts(*first) == parts(k)).unwrap_or(k)).collect()
+}
+
+/// Errors of an image by every state; `alike` is the first that has the cameras and plates of each.
+fn errors_of(
+    joint: &Adjustment,
+    image: usize,
+    (states, alike): (&[Option<State>], &[usize]),
+) -> Vec<Option<ImageError>> {
+    let mut seen: Vec<Option<Pose>> = Vec::with_capacity(states.len());
+    let error = |(k, state): (usize, &Option<State>)| {
+        let own = match alike[k] {
+            first if first < k => seen[first],
+            _ => state.as_ref().and_then(|state| seen_pose(joint, state, image)),
+        };
+        seen.push(own);
+        error_of_predicted(joint, state.as_ref()?, image, &own?)
+    };
+    states.iter().enumerate().map(error).collect()
 }
 
 fn summary(errors: &Errors, clusters: &[usize], k: usize, joint: Option<usize>) -> Option<HeldOut> {
@@ -176,7 +207,8 @@ fn summary(errors: &Errors, clusters: &[usize], k: usize, joint: Option<usize>) 
 
 fn truth_errors(joint: &Adjustment, truth: &Truth) -> Result<Vec<Option<TruthError>>> {
     let Some(whole) = LinearisedAdjustment::of(joint.clone()) else { return Ok(vec![None; Estimator::ALL.len()]) };
-    let found = fitted(whole, PoseStage::solved(joint).as_ref(), &Estimator::ALL, None);
+    let refit = || Some(refitted_near(whole.clone()));
+    let found = fitted(joint, PoseStage::solved(joint).as_ref(), &Estimator::ALL, refit);
     found.iter().map(|s| s.as_ref().map(|s| truth_error(s, truth)).transpose().map(Option::flatten)).collect()
 }
 

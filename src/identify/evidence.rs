@@ -17,7 +17,7 @@ use super::solution::{Evidence, LensEvidence, Solution};
 use super::turns;
 use crate::diagnose::{ToolInPoses, follows_from_tool};
 use crate::error::{Notice, Result};
-use crate::fit::{Fit, log_evidence};
+use crate::fit::{Fit, log_evidence, log_evidence_of_fit};
 use crate::linalg::SymmetricFactor;
 use crate::model::joint_terms::RobotModel;
 use crate::model::robot::Robot;
@@ -167,7 +167,7 @@ fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> Option<(Evidence,
     let whole = if dropped.is_empty() { full.adjustment.clone() } else { without_terms(full, &dropped) };
     let some = whole.some_stops(MANY_STOPS, SOME_STOPS);
     if dropped.is_empty() && some.is_none() {
-        return Some((told(full.linear(), model)?, whole));
+        return Some((told(full.linear(), model, log_evidence_of_fit(full)?), whole));
     }
     let mut smaller = some.unwrap_or(whole);
     let settings = Settings { decrement: DECREMENT, ..Settings::default() };
@@ -186,7 +186,8 @@ fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> Option<(Evidence,
         }
         false => solve(smaller, &settings),
     };
-    let evidence = told(outcome.linear()?, model)?;
+    let linear = outcome.linear()?;
+    let evidence = told(linear, model, log_evidence(linear)?);
     Some((evidence, outcome.adjustment))
 }
 
@@ -223,8 +224,8 @@ fn without_terms(full: &Fit, dropped: &[usize]) -> Adjustment {
 }
 
 /// Of the model that an adjustment has, at its optimum.
-fn told(linear: LinearProblem, model: RobotModel) -> Option<Evidence> {
+fn told(linear: LinearProblem, model: RobotModel, log_evidence: f64) -> Evidence {
     let layout = &linear.adjustment.problem.layout;
     let parameters = layout.columns[layout.robot()].iter().filter(|c| c.free).count();
-    Some(Evidence { model, log_evidence: log_evidence(linear)?, cost: linear.lin.cost, parameters })
+    Evidence { model, log_evidence, cost: linear.lin.cost, parameters }
 }

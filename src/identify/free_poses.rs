@@ -19,7 +19,8 @@ use crate::problem::{
 };
 use crate::solve::{
     ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
-    estimate_components, frames, in_frame, in_frame_by, reject_contradictory, reject_observations, solve,
+    estimate_components, estimate_components_near, frames, in_frame, in_frame_by, reject_contradictory,
+    reject_observations, solve,
 };
 use crate::stage::stage;
 
@@ -405,7 +406,7 @@ fn finish(start: Adjustment, limits: &Limits) -> Result<(Adjustment, FreePoses)>
         if reject_contradictory(&mut outcome.adjustment).is_none() && !changed {
             break;
         }
-        outcome = estimate_components(outcome.adjustment, &options);
+        outcome = estimate_components_near(outcome.adjustment, &options);
     }
     if outcome.status != Status::Converged {
         return Err(facing(&outcome.adjustment, limits.facing_tilt_rad).unwrap_or_else(|| {

@@ -20,9 +20,9 @@ use crate::fit::{Fit, FreePoses};
 use crate::problem::MeasuredSeries;
 use crate::problem::{Adjustment, Family, FitsReadings, ImageRejection, Misfit, Mismatch, Problem};
 use crate::solve::{
-    ComponentOptions, LEAST_FIRST_GUESS, LinearisedAdjustment, NoiseInformation, Outcome, Status, estimate_components,
-    estimate_components_from_above, noise_information, reject_bodies, reject_contradicting, reject_observations,
-    reject_stops, without_unidentified_noise,
+    ComponentOptions, Ended, LEAST_FIRST_GUESS, LinearisedAdjustment, NoiseInformation, Outcome, Status,
+    estimate_components, estimate_components_from_above, estimate_components_near, noise_information, reject_bodies,
+    reject_contradicting, reject_observations, reject_stops, without_unidentified_noise,
 };
 use crate::stage::stage;
 use crate::urdf::Chain;
@@ -96,25 +96,26 @@ pub(super) fn fit_model(
     let aside =
         start_robot(&mut start, free, StartGiven { series, groups: &[], limits: &options.limits }, &mut starts)?;
     start_bodies(&mut start, series, &options.limits)?;
-    let (mut outcome, before) = {
+    let (mut ended, before) = {
         let _stage = stage("joint fit");
         fit(start, free, (&aside, near.as_ref()), options)
     };
-    let (status, iterations) = (outcome.status, outcome.iterations);
-    name_wrong_pairs(&mut outcome.adjustment, free, options.limits.other_readings_explain);
+    name_wrong_pairs(ended.adjustment_mut(), free, options.limits.other_readings_explain);
     let context = CheckContext { series, free, on_robot, stated_noise: None, limits: &options.limits };
     let mut diagnosis = Diagnosis::new(context);
-    diagnosis.after_free_poses(&outcome.adjustment.problem);
-    diagnosis.after_left_out(&outcome.adjustment)?;
+    diagnosis.after_free_poses(&ended.adjustment().problem);
+    diagnosis.after_left_out(ended.adjustment())?;
+    let advice = not_converged(&ended.adjustment().problem);
+    let Ended { status, iterations, fit } = ended;
     if status != Status::Converged {
         return Err(Error::new(
             Code::NotConverged,
             "joint fit",
             format!("ended without converging ({status:?})"),
-            not_converged(&outcome.adjustment.problem),
+            advice,
         ));
     }
-    let fit = outcome.fit().map_err(|e| {
+    let fit = fit.map_err(|e| {
         Error::new(Code::FitUndetermined, "joint fit", e.to_string(), "take stops that move every joint")
     })?;
     let options = options.clone();
@@ -160,7 +161,7 @@ impl JointFit {
             false => Some(refitted_near(left)),
         };
         let (accuracy, held_out) = hold_out(fit.linear(), &fitted, limits)
-            .or_else(|| hold_out_bodies(fit.linear(), limits))
+            .or_else(|| Some((hold_out_bodies(fit.linear(), limits)?, Vec::new())))
             .ok_or_else(|| nothing_held_out("hold-out", &fit.problem, limits, noise))?;
         {
             let _stage = stage("diagnoses");
@@ -206,7 +207,7 @@ fn fit(
     free: &FreePoses,
     (aside, near): (&[usize], Option<&Adjustment>),
     options: &Options,
-) -> (Outcome, Option<NoiseInformation>) {
+) -> (Ended, Option<NoiseInformation>) {
     let exact = options.joint_noise == JointNoise::Known(0.0);
     if exact {
         start.problem.noise.displacement.clear();
@@ -222,7 +223,7 @@ fn fit(
     let components =
         ComponentOptions { joint: options.joint_noise == JointNoise::Estimated, ..ComponentOptions::default() };
     let mut outcome = match near {
-        Some(_) => estimate_components(start, &components),
+        Some(_) => estimate_components_near(start, &components),
         None => estimate_components_from_above(start, &components),
     };
     for _ in 0..ROUNDS {
@@ -236,7 +237,7 @@ fn fit(
         outcome = estimate_components(outcome.adjustment, &components);
         outcome = without_contradicting(outcome, &components, &options.limits);
     }
-    if components.joint { without_unidentified_noise(outcome, &components.settings) } else { (outcome, None) }
+    if components.joint { without_unidentified_noise(outcome, &components.settings) } else { (outcome.ended(), None) }
 }
 
 /// Leaves out what disagrees with all else, as long as something does.
@@ -248,7 +249,7 @@ fn without_contradicting(mut outcome: Outcome, components: &ComponentOptions, li
         if !anything && !leave_worst_out(&mut outcome, limits) {
             break;
         }
-        outcome = estimate_components(outcome.adjustment, components);
+        outcome = estimate_components_near(outcome.adjustment, components);
     }
     outcome
 }

@@ -10,7 +10,7 @@ use super::solution::{LensEvidence, Solution};
 use crate::assess::{Limits, camera_shows_pattern};
 use crate::diagnose::LensNotInRos;
 use crate::error::{Code, Error, Notice, Result};
-use crate::fit::{FreePoses, log_evidence};
+use crate::fit::{FreePoses, log_evidence, log_evidence_of_fit};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Family, LensChoice, MeasuredSeries, Problem, predict};
@@ -145,8 +145,9 @@ fn compare_lenses(
     let fit = &joint.fit;
     let Some(k) = fit.problem.cameras.iter().position(|c| c == camera) else { return (Vec::new(), None) };
     let some = fit.adjustment.some_stops(MANY_STOPS, SOME_STOPS).map(|some| settled(some, ROUNDS));
-    let Some(present) = some.as_ref().map_or(Some(fit.linear()), converged) else { return (Vec::new(), None) };
-    let lens = present.adjustment.state.cameras[k].lens;
+    let some = some.map(|some| (some.status == Status::Converged).then(|| some.fit().ok()).flatten());
+    let Some(present) = some.as_ref().map_or(Some(fit), Option::as_ref) else { return (Vec::new(), None) };
+    let lens = present.state.cameras[k].lens;
     let is_wide = fit.state.cameras[k].corner() > limits.fisheye_tangent;
     let depths = depths_m(&fit.problem, &joint.start.free)[k];
     let is_asked = |l: &Lens| *l == lens || (choice.has(*l) && (l.formula() != Lens::Fisheye || is_wide));
@@ -155,8 +156,8 @@ fn compare_lenses(
         _ => Lens::ALL.into_iter().filter(is_asked).collect(),
     };
     let found = side_by_side(&fit.problem, &lenses, |_, next| match *next == lens {
-        true => told(present, k).map(|told| (told, None)),
-        false => evidence(present.adjustment, (k, &depths), *next),
+        true => log_evidence_of_fit(present).map(|evidence| (told(present.linear(), k, evidence), None)),
+        false => evidence(&present.adjustment, (k, &depths), *next),
     });
     let mut all: Vec<(LensEvidence, Option<BetterLens>)> = found.into_iter().flatten().collect();
     let best = all.iter().map(|(e, _)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
@@ -206,8 +207,8 @@ fn evidence(
     // The size of a displacement field is found from above.
     let rounds = if lens.has_field() { FIELD_ROUNDS } else { ROUNDS };
     let outcome = settled(with_lens(fit, (camera, depths_m), lens)?, rounds);
-    let linear = converged(&outcome)?;
-    Some((told(linear, camera)?, Some(BetterLens::of(linear, camera))))
+    let linear = outcome.linear().filter(|_| outcome.status == Status::Converged)?;
+    Some((told(linear, camera, log_evidence(linear)?), Some(BetterLens::of(linear, camera))))
 }
 
 /// The optimum near an adjustment. Image noise follows the lens; joint noise, tilt and the sizes of families stay.
@@ -219,17 +220,13 @@ fn settled(mut near: Adjustment, rounds: usize) -> Outcome {
     estimate_components(near, &options)
 }
 
-fn converged(outcome: &Outcome) -> Option<LinearProblem<'_>> {
-    outcome.linear().filter(|_| outcome.status == Status::Converged)
-}
-
 /// Of the lens that a camera has at an optimum.
-fn told(linear: LinearProblem, camera: usize) -> Option<LensEvidence> {
+fn told(linear: LinearProblem, camera: usize, log_evidence: f64) -> LensEvidence {
     let Adjustment { problem, state } = linear.adjustment;
     let (found, camera) = (&state.cameras[camera], problem.cameras[camera].clone());
-    let log_evidence = log_evidence(linear)? + of_noise(linear) + of_formula(found);
+    let log_evidence = log_evidence + of_noise(linear) + of_formula(found);
     let centre_px = [found.parameters[2], found.parameters[3]];
-    Some(LensEvidence { camera, lens: found.lens, log_evidence, centre_px, taken: false })
+    LensEvidence { camera, lens: found.lens, log_evidence, centre_px, taken: false }
 }
 
 /// The adjustment with another lens for one camera, which images as the present one does.

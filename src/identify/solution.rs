@@ -6,16 +6,14 @@ use super::comparison::Comparison;
 use super::estimator::Estimator;
 use super::options::Options;
 use super::start_verdict::StartVerdict;
-use crate::assess::Accuracy;
-use crate::assess::Uncertainty;
+use crate::assess::{Accuracy, ImageError, Uncertainty};
 use crate::diagnose::Finding;
 use crate::error::Notice;
 use crate::fit::{Fit, FreePoses};
 use crate::model::camera::Lens;
 use crate::model::joint_terms::RobotModel;
 use crate::model::robot::Robot;
-use crate::problem::Adjustment;
-use crate::problem::{MeasuredSeries, State};
+use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::Status;
 
 /// Evidence of a robot model.
@@ -69,8 +67,8 @@ pub struct Solution {
     pub lenses: Vec<LensEvidence>,
     /// Before and after, held out.
     pub accuracy: Accuracy,
-    /// States of the joint fit without the images of each fold; none for a result in two stages.
-    pub held_out: Vec<State>,
+    /// Errors of the images that the joint fit was held out of, with their indices, ascending; none for a result in two stages.
+    pub held_out: Vec<(usize, ImageError)>,
     /// Two-stage fits beside the joint one, where asked for ([`super::beside_two_stages`]).
     pub two_stage: Option<Comparison>,
     /// Starting values with their verdicts.

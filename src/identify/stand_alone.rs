@@ -123,7 +123,7 @@ impl Adjusted {
     /// True where the residuals of one of some cameras show a pattern, or do not tell.
     fn shows_pattern(&self, cameras: &[String], limits: &Limits) -> bool {
         let own = self.fit.problem.cameras.iter().enumerate().filter(|(_, name)| cameras.contains(name));
-        own.into_iter().any(|(k, _)| camera_shows_pattern(self.fit.linear(), k, limits).unwrap_or(true))
+        own.into_iter().any(|(k, _)| camera_shows_pattern(&self.fit, k, limits).unwrap_or(true))
     }
 }
 

@@ -15,7 +15,7 @@ use crate::linalg::{SymmetricFactor, product};
 use crate::problem::{Adjustment, Chained, Problem, SIZE_OF_DISPLACEMENT, State, Step, TakenFrom, Tie};
 use crate::solve::{
     Acceleration, ComponentOptions, Elimination, JOINT_NOISE_FLOOR, LEAST_FIRST_GUESS, LinearImage,
-    LinearisedAdjustment, Settings, Status, Tally, estimate_components, share_out, solve,
+    LinearisedAdjustment, Settings, Status, Tally, estimate_components, share_out, solve_near,
 };
 
 use super::block_diagonal::BlockDiagonal;
@@ -66,7 +66,7 @@ impl PoseStage {
 
     /// The free-pose adjustment of all observations in use, with the pixel noise that `start` has.
     pub fn solved(start: &Adjustment) -> Option<LinearisedAdjustment> {
-        let outcome = solve(with_free_poses(start)?, &AT_POSES);
+        let outcome = solve_near(with_free_poses(start)?, &AT_POSES);
         let linearised = outcome.linearised.filter(|_| outcome.status == Status::Converged)?;
         Some(LinearisedAdjustment { adjustment: outcome.adjustment, linearised })
     }

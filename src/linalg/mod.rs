@@ -22,6 +22,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Cholesky factor of a symmetric positive definite matrix, with the diagonal scaled to one first.
+#[derive(Debug, Clone)]
 pub struct SymmetricFactor {
     scale: DVector<f64>,
     /// In the lower triangle; what lies above is not read.
@@ -55,10 +56,10 @@ impl SymmetricFactor {
             return Err(NotPositiveDefinite { row: m.nrows().min(m.ncols()) });
         }
         let scale = m.diagonal().map(|d| 1.0 / d.sqrt());
-        let mut scaled = DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * scale[i] * scale[j]);
+        let mut scaled = scaled_lower(m, &scale);
         if !scaled.iter().all(|x| x.is_finite()) {
-            let row = scaled.row_iter().position(|r| !r.iter().all(|x| x.is_finite()));
-            return Err(NotPositiveDefinite { row: row.unwrap_or_default() });
+            let is_finite = |i: usize| (0..m.ncols()).all(|j| (m[(i, j)] * scale[i] * scale[j]).is_finite());
+            return Err(NotPositiveDefinite { row: (0..m.nrows()).find(|i| !is_finite(*i)).unwrap_or_default() });
         }
         let needed = factor::cholesky_in_place_scratch::<f64>(m.nrows(), Par::Seq, Default::default());
         let (mut memory, options) = (MemBuffer::new(needed), Default::default());
@@ -94,12 +95,11 @@ impl SymmetricFactor {
         let mut lower = DMatrix::zeros(n, n);
         let mut memory = MemBuffer::new(inverse::inverse_scratch::<f64>(n, Par::Seq));
         inverse::inverse(view_mut(&mut lower), view(&self.factor), Par::Seq, MemStack::new(&mut memory));
-        for j in 0..n {
-            for i in j..n {
-                lower[(i, j)] *= self.scale[i] * self.scale[j];
-            }
+        for (j, column) in lower.as_mut_slice().chunks_exact_mut(n.max(1)).enumerate() {
+            let of = self.scale[j];
+            column[j..].iter_mut().zip(&self.scale.as_slice()[j..]).for_each(|(x, scale)| *x *= scale * of);
         }
-        lower.fill_upper_triangle_with_lower_triangle();
+        mirror_lower(&mut lower);
         lower
     }
 
@@ -219,11 +219,38 @@ pub fn add_gram(a: &mut DMatrix<f64>, y: &DMatrix<f64>, factor: f64) {
     });
 }
 
+/// `m` with its diagonal scaled to one: lower triangle, zeros above.
+fn scaled_lower(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    let n = m.nrows();
+    let mut scaled = DMatrix::zeros(n, n);
+    let columns = scaled.as_mut_slice().chunks_exact_mut(n.max(1)).zip(m.as_slice().chunks_exact(n.max(1)));
+    for (j, (into, of)) in columns.enumerate() {
+        let values = of[j..].iter().zip(&scale.as_slice()[j..]);
+        into[j..].iter_mut().zip(values).for_each(|(x, (value, own))| *x = value * own * scale[j]);
+    }
+    scaled
+}
+
+/// Rows and columns of the squares in which a triangle is copied to the other: both stay in the nearest cache.
+const SQUARE: usize = 32;
+
 /// Copies the upper triangle to the lower one.
 pub fn mirror_upper(a: &mut DMatrix<f64>) {
-    for j in 0..a.ncols() {
-        for i in 0..j {
-            a[(j, i)] = a[(i, j)];
+    each_pair(a, |values, above, below| values[below] = values[above]);
+}
+
+/// Copies the lower triangle to the upper one.
+fn mirror_lower(a: &mut DMatrix<f64>) {
+    each_pair(a, |values, above, below| values[above] = values[below]);
+}
+
+/// Goes through the places of a square matrix above the diagonal, each with its place below.
+fn each_pair(a: &mut DMatrix<f64>, pair: impl Fn(&mut [f64], usize, usize)) {
+    let n = a.ncols();
+    let values = a.as_mut_slice();
+    for (first_column, first_row) in (0..n).step_by(SQUARE).flat_map(|j| (0..=j).step_by(SQUARE).map(move |i| (j, i))) {
+        for j in first_column..(first_column + SQUARE).min(n) {
+            (first_row..(first_row + SQUARE).min(j)).for_each(|i| pair(values, j * n + i, i * n + j));
         }
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use super::acceleration::Acceleration;
 use super::body_components::{BodyTally, update_bodies};
 use super::fit::Fit;
-use super::levenberg::{Outcome, Settings, Status, minimise, minimise_near, minimise_with_priors};
+use super::levenberg::{Minimised, Outcome, Settings, Status, minimise, minimise_near, minimise_with_priors};
 use super::linear::{LinearImage, LinearStop};
 use super::tally::JOINT_NOISE_FLOOR;
 use crate::problem::{Adjustment, Noise, Problem};
@@ -77,9 +77,24 @@ pub fn estimate_components_from_above(start: Adjustment, options: &ComponentOpti
 
 /// Alternates solving and re-estimating until the components stand. The adjustment keeps the final components.
 pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Outcome {
+    let rough = rough(&start, options);
+    rounds(minimise(start, &rough), (options, &rough))
+}
+
+/// As [`estimate_components`], from near the end.
+pub fn estimate_components_near(start: Adjustment, options: &ComponentOptions) -> Outcome {
+    let rough = rough(&start, options);
+    rounds(minimise_near(start, &rough), (options, &rough))
+}
+
+/// Bounds of the solves between rounds.
+fn rough(start: &Adjustment, options: &ComponentOptions) -> Settings {
     let rough = Settings { decrement: ROUGH_DECREMENT.max(options.settings.decrement), ..options.settings };
-    let rough = rough.of_stops(start.used_stops().len());
-    let mut minimised = minimise(start, &rough);
+    rough.of_stops(start.used_stops().len())
+}
+
+/// Rounds from the first solve on.
+fn rounds(mut minimised: Minimised, (options, rough): (&ComponentOptions, &Settings)) -> Outcome {
     let mut iterations = minimised.outcome.iterations;
     let mut acceleration = Acceleration::default();
     for round in 0..options.rounds {
@@ -98,8 +113,8 @@ pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Out
         let noise = &fit.problem.noise;
         tracing::debug!(round, change, pixel = ?noise.pixel_factor, joint = ?noise.joint, "variance components");
         minimised = match serves_on {
-            true => minimise_with_priors(fit.adjustment, fit.linearised, &rough),
-            false => minimise_near(fit.adjustment, &rough),
+            true => minimise_with_priors(fit.adjustment, fit.linearised, rough),
+            false => minimise_near(fit.adjustment, rough),
         };
         iterations += minimised.outcome.iterations;
         if change < CONVERGED || minimised.outcome.status == Status::BadStart {

@@ -3,10 +3,11 @@
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::linear::{LinearProblem, LinearStop};
+use super::right_hand_sides::RightHandSides;
 use super::stop_covariance::StopCovariance;
 use super::system::{Elimination, Singular, System};
 use crate::linalg::SymmetricFactor;
-use crate::problem::Problem;
+use crate::problem::{Problem, Step};
 
 /// Covariance of the reduced unknowns (dense columns, then latents or markers), with what is needed for the eliminated family.
 #[derive(Debug, Clone)]
@@ -15,6 +16,8 @@ pub struct Covariance {
     pub reduced: DMatrix<f64>,
     /// The undamped system that it is of.
     pub system: System,
+    /// Factor of its information.
+    factor: SymmetricFactor,
     /// Natural logarithm of the determinant of the reduced information.
     pub log_determinant: f64,
     /// What was added to the first unknowns.
@@ -39,7 +42,7 @@ impl LinearProblem<'_> {
     pub fn covariance_by(self, which: Elimination) -> Result<Covariance, Singular> {
         let system = System::with(which, self, 0.0);
         let factor = system.factor(self)?;
-        Ok(Covariance::of(&self.adjustment.problem, system, &factor))
+        Ok(Covariance::of(&self.adjustment.problem, system, factor))
     }
 }
 
@@ -52,11 +55,16 @@ fn fixed_are_known(problem: &Problem, reduced: &mut DMatrix<f64>) {
 
 impl Covariance {
     /// From the factor of a system.
-    pub(super) fn of(problem: &Problem, system: System, factor: &SymmetricFactor) -> Self {
+    pub(super) fn of(problem: &Problem, system: System, factor: SymmetricFactor) -> Self {
         let mut reduced = factor.inverse();
         fixed_are_known(problem, &mut reduced);
         let log_determinant = factor.log_determinant();
-        Self { reduced, log_determinant, system, added: None, enlarged: Vec::new() }
+        Self { reduced, log_determinant, system, factor, added: None, enlarged: Vec::new() }
+    }
+
+    /// Steps for right-hand sides of their own.
+    pub(super) fn steps(&self, linear: LinearProblem, of: &RightHandSides) -> Vec<Step> {
+        self.system.steps(linear, &self.factor, of)
     }
 
     /// Standard deviation of a dense column, in its unit.

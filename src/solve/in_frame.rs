@@ -69,7 +69,7 @@ pub fn in_frame_by(which: Elimination, linear: LinearProblem, stated: &Covarianc
     let singular =
         |e: Singular| Error::new(Code::FitUndetermined, "plate", e.to_string(), "take images of more of the plate");
     let factor = system.factor(linear).map_err(singular)?;
-    let mut covariance = Covariance::of(problem, system, &factor);
+    let mut covariance = Covariance::of(problem, system, factor);
     if let (Eliminated::Stops(e), Some(held)) = (&covariance.system.eliminated, &held) {
         e.project(held, &mut covariance.reduced);
     }

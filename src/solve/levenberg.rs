@@ -74,6 +74,11 @@ impl Outcome {
         Some(self.adjustment.linear(self.linearised.as_ref()?))
     }
 
+    /// How it ended, with its fit.
+    pub fn ended(self) -> Ended {
+        Ended { status: self.status, iterations: self.iterations, fit: self.fit() }
+    }
+
     /// With its covariance.
     ///
     /// # Errors
@@ -89,6 +94,32 @@ impl Outcome {
                 Err(Box::new(NoFit { outcome, singular: Some(singular) }))
             }
             (_, outcome) => Err(Box::new(NoFit { outcome, singular: None })),
+        }
+    }
+}
+
+/// How an iteration ended, and its fit where there is one.
+#[derive(Debug, Clone)]
+pub struct Ended {
+    /// How it ended.
+    pub status: Status,
+    /// Steps tried.
+    pub iterations: usize,
+    /// The fit.
+    pub fit: Result<Fit, Box<NoFit>>,
+}
+
+impl Ended {
+    /// The adjustment at its best state.
+    pub fn adjustment(&self) -> &Adjustment {
+        self.fit.as_ref().map_or_else(|unsolved| &unsolved.outcome.adjustment, |fit| &fit.adjustment)
+    }
+
+    /// The same, to be changed.
+    pub fn adjustment_mut(&mut self) -> &mut Adjustment {
+        match &mut self.fit {
+            Ok(fit) => &mut fit.adjustment,
+            Err(unsolved) => &mut unsolved.outcome.adjustment,
         }
     }
 }
@@ -171,7 +202,7 @@ impl Model {
     /// The covariance, where the model stands for the end of the iteration.
     fn covariance(self, adjustment: &Adjustment) -> Option<Covariance> {
         let is_near = self.is_whole && !self.is_curved && self.decrement <= NEAR && self.lambda <= LAMBDA_IF_REFUSED;
-        is_near.then(|| Covariance::of(&adjustment.problem, self.system, &self.factor))
+        is_near.then(|| Covariance::of(&adjustment.problem, self.system, self.factor))
     }
 
     fn proposal(&self, linear: LinearProblem) -> Proposal {
@@ -324,6 +355,11 @@ fn approach(adjustment: &mut Adjustment, most: usize) -> usize {
 /// Minimises the cost from where the adjustment stands.
 pub fn solve(adjustment: Adjustment, settings: &Settings) -> Outcome {
     minimise(adjustment, settings).outcome
+}
+
+/// As [`solve`], from near the end.
+pub fn solve_near(adjustment: Adjustment, settings: &Settings) -> Outcome {
+    minimise_near(adjustment, settings).outcome
 }
 
 /// As [`solve`], with the covariance; `None` where it did not converge, or has none.

@@ -37,13 +37,15 @@ mod tally;
 mod unidentified_noise;
 
 pub use acceleration::Acceleration;
-pub use components::{ComponentOptions, LEAST_FIRST_GUESS, estimate_components, estimate_components_from_above};
+pub use components::{
+    ComponentOptions, LEAST_FIRST_GUESS, estimate_components, estimate_components_from_above, estimate_components_near,
+};
 pub use covariance::Covariance;
 pub use fit::Fit;
 pub use frame::{Frame, PlateScale, Similarity, frames};
 pub use in_frame::{InFrame, in_frame, in_frame_by};
 pub use length_misfit::LengthMisfit;
-pub use levenberg::{NoFit, Outcome, Settings, Status, converged, solve};
+pub use levenberg::{Ended, NoFit, Outcome, Settings, Status, converged, solve, solve_near};
 pub use linear::{BodyPart, LinearImage, LinearProblem, LinearStop, Linearised};
 pub use linearised_adjustment::LinearisedAdjustment;
 pub use noise_information::{NoiseInformation, Spread, noise_information};

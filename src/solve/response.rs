@@ -10,14 +10,18 @@
 //! `s` is the score of `y = 0`, `M` its information with everything else estimated; `s' M^-1 s` is chi-squared where `y = 0`, and `y`, `dx`
 //! are the step to the fit with the columns.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector, Vector2, Vector6};
 use rayon::prelude::*;
 
 use super::blocks::STOPS_A_PRODUCT;
+use super::covariance::Covariance;
+use super::fit::Fit;
 use super::linear::{LinearImage, LinearProblem};
 use super::right_hand_sides::{OfImage, RightHandSides};
 use super::seen_markers::SeenMarkers;
-use super::system::{Singular, System};
+use super::system::Singular;
 use crate::linalg::product;
 use crate::problem::{E, Equations, Step};
 
@@ -38,18 +42,32 @@ pub struct Response {
     pub equations: usize,
 }
 
-impl<'a> LinearProblem<'a> {
+impl Fit {
     /// Response to columns that `of_image` gives, whitened, one row an equation.
     ///
     /// # Errors
     /// Information that is not positive definite.
-    pub fn response(
-        self,
+    pub fn response<'a>(
+        &'a self,
         count: usize,
         of_image: impl Fn(&LinearImage<'a>, &Equations) -> DMatrix<f64> + Sync,
     ) -> Result<Response, Singular> {
-        let system = System::new(self, 0.0);
-        let factor = system.factor(self)?;
+        let covariance = match self.problem.restraint.is_some() {
+            // What holds a robot near nominal is not in the covariance.
+            true => Cow::Owned(self.linear().covariance()?),
+            false => Cow::Borrowed(&self.covariance),
+        };
+        Ok(self.linear().response(&covariance, count, of_image))
+    }
+}
+
+impl<'a> LinearProblem<'a> {
+    fn response(
+        self,
+        covariance: &Covariance,
+        count: usize,
+        of_image: impl Fn(&LinearImage<'a>, &Equations) -> DMatrix<f64> + Sync,
+    ) -> Response {
         let places: Vec<usize> = (0..self.images().len()).collect();
         let columns_of = |k: usize| {
             let image = self.image(k);
@@ -67,7 +85,7 @@ impl<'a> LinearProblem<'a> {
             let own: Vec<_> = some.par_iter().map(of).collect();
             own.iter().flatten().for_each(|(image, own)| right_hand_sides.add(&seen, image, own));
         }
-        let steps = system.steps(self, &factor, &right_hand_sides);
+        let steps = covariance.steps(self, &right_hand_sides);
         let parts: Vec<Sums> = places
             .par_iter()
             .filter_map(|&k| {
@@ -79,7 +97,7 @@ impl<'a> LinearProblem<'a> {
         parts.iter().for_each(|p| all.add(p));
         let information = (&all.information + all.information.transpose()) * 0.5;
         let Sums { by_itself, score, squares, equations, .. } = all;
-        Ok(Response { information, by_itself, score, steps, squares, equations })
+        Response { information, by_itself, score, steps, squares, equations }
     }
 }
 

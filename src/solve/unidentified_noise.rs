@@ -5,8 +5,7 @@
 //! S. Self, K.-Y. Liang 1987).
 
 use super::components::ComponentOptions;
-use super::fit::Fit;
-use super::levenberg::{Outcome, Settings, solve};
+use super::levenberg::{Ended, Outcome, Settings, solve};
 use super::noise_information::{NoiseInformation, noise_information};
 use super::tally::JOINT_NOISE_FLOOR;
 use crate::problem::Adjustment;
@@ -20,24 +19,25 @@ const PLAIN: f64 = 3.0;
 /// Readings of one kind, in all series: one of them alone may have too few stops to tell what all together do.
 type Group = Vec<usize>;
 
-/// The outcome with such noise at its floor, and what was known of all noise before, where that changed.
-pub fn without_unidentified_noise(outcome: Outcome, settings: &Settings) -> (Outcome, Option<NoiseInformation>) {
-    let (outcome, found) = told_by(outcome, |fit| {
-        noise_information(fit).map(|found| (found, fit.most_likely_noise(&ComponentOptions::default())))
-    });
-    let Some((found, most_likely)) = found else { return (outcome, None) };
-    let noise = &outcome.adjustment.problem.noise;
+/// The fit with such noise at its floor, and what was known of all noise before, where that changed.
+pub fn without_unidentified_noise(outcome: Outcome, settings: &Settings) -> (Ended, Option<NoiseInformation>) {
+    let found = outcome.ended();
+    let Some(told) = found.fit.as_ref().ok().and_then(noise_information) else { return (found, None) };
+    let noise = &found.adjustment().problem.noise;
     let series: Vec<usize> = (0..noise.joint.len()).collect();
     let above_floor = |r: &usize| noise.joint.iter().any(|own| own[*r] > JOINT_NOISE_FLOOR);
-    let in_doubt: Vec<Group> = groups(&outcome.adjustment)
-        .filter(|group| found.mean_variance(&series, group).interval(PLAIN)[0] == 0.0)
+    let in_doubt: Vec<Group> = groups(found.adjustment())
+        .filter(|group| told.mean_variance(&series, group).interval(PLAIN)[0] == 0.0)
         .filter(|group| group.iter().any(above_floor))
         .collect();
     if in_doubt.is_empty() {
-        return (outcome, None);
+        return (found, None);
     }
-    let (at_none, spread) = told_by(solved_without(&outcome.adjustment, &in_doubt, settings), noise_information);
-    let Some(spread) = spread else { return (outcome, None) };
+    let Ok(most_likely) = found.fit.as_ref().map(|fit| fit.most_likely_noise(&ComponentOptions::default())) else {
+        return (found, None);
+    };
+    let at_none = solved_without(found.adjustment(), &in_doubt, settings).ended();
+    let Some(spread) = at_none.fit.as_ref().ok().and_then(noise_information) else { return (found, None) };
     let is_identified = |group: &Group| {
         let of_series = |own: &Vec<f64>| group.iter().map(|&r| own[r] * own[r]).sum::<f64>() / group.len() as f64;
         let variance = most_likely.joint.iter().map(of_series).sum::<f64>() / series.len() as f64;
@@ -45,9 +45,9 @@ pub fn without_unidentified_noise(outcome: Outcome, settings: &Settings) -> (Out
     };
     let (kept, unidentified): (Vec<Group>, Vec<Group>) = in_doubt.into_iter().partition(is_identified);
     match (kept.is_empty(), unidentified.is_empty()) {
-        (_, true) => (outcome, None),
-        (true, _) => (at_none, Some(found)),
-        _ => (solved_without(&outcome.adjustment, &unidentified, settings), Some(found)),
+        (_, true) => (found, None),
+        (true, _) => (at_none, Some(told)),
+        _ => (solved_without(found.adjustment(), &unidentified, settings).ended(), Some(told)),
     }
 }
 
@@ -55,18 +55,6 @@ pub fn without_unidentified_noise(outcome: Outcome, settings: &Settings) -> (Out
 fn groups(Adjustment { problem, state }: &Adjustment) -> impl Iterator<Item = Group> + '_ {
     let of_stops = problem.noise.groups(&state.robot.chain.reading_kinds).into_iter();
     of_stops.filter(|g| g.iter().all(|&r| problem.noise.local.get(r).is_none_or(|s| *s == 0.0)))
-}
-
-/// The outcome as it is, and what its fit tells.
-fn told_by<T>(outcome: Outcome, ask: impl Fn(&Fit) -> Option<T>) -> (Outcome, Option<T>) {
-    let Outcome { status, iterations, .. } = outcome;
-    match outcome.fit() {
-        Ok(fit) => {
-            let found = ask(&fit);
-            (Outcome { status, iterations, adjustment: fit.adjustment, linearised: Some(fit.linearised) }, found)
-        }
-        Err(unsolved) => (Outcome { status, ..unsolved.outcome }, None),
-    }
 }
 
 /// Solved with the noise of some groups at its floor.
