@@ -497,7 +497,7 @@ fn summary(
     let taught = plan.legs.iter().filter(|l| !l.is_free).count();
     if taught > 0 {
         text += &format!(
-            "ways      {taught} without a free straight way were found: the programs stop before them; teach a posture in between (plan.json)\n"
+            "ways      {taught} without a free straight way were found: the programs stop before them (the ROS trajectory lists them under pauses); teach a posture in between (plan.json)\n"
         );
     }
     let worst = plan.imbalance.iter().copied().fold(0.0, f64::max);
