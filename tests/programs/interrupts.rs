@@ -30,6 +30,8 @@ fn what_a_handler_sets_may_hold_behind_every_motion_and_what_is_stated_again_hol
         (format!("MOVE\n{INTERRUPT}SET\nMOVE\nSET\nMOVE\n{set}"), 3, vec![]),
         (format!("{INTERRUPT}SET\nMOVE\nMOVE\n{set}"), 1, vec![tool]),
         (format!("{INTERRUPT}SET\nWAIT SEC 1\nMOVE\n{set}"), 0, vec![tool]),
+        (format!("{INTERRUPT}SET\nWEAVE()\nMOVE\n{set}"), 0, vec![tool]),
+        (format!("{INTERRUPT}SET\nR=SIN(3)\nMOVE\n{set}"), 1, vec![]),
         (format!("{INTERRUPT}sub()\nEND\nDEF sub()\nSET\nMOVE\nMOVE\n{set}"), 1, vec![tool]),
         (format!("{INTERRUPT}SET\n{spline}"), 3, vec![tool]),
     ] {

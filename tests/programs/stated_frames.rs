@@ -100,6 +100,9 @@ fn a_handler_and_a_label_of_krl_begin_with_what_a_sensor_or_a_fixed_tool_may_do(
     for (body, corrected, left) in [
         (format!("{begins}WAIT SEC 1\n{handler}"), 2, vec![]),
         (format!("{begins}RSI_ON()\nWAIT SEC 1\nRSI_OFF()\n{handler}"), 1, vec![work]),
+        (format!("{begins}RSI_ON()\nRSI_MoveCorr()\nRSI_OFF()\n{handler}"), 1, vec![work]),
+        (format!("{begins}RSI_ON()\nWEAVE()\nRSI_OFF()\n{handler}"), 1, vec![work]),
+        (format!("{begins}RSI_ON()\nR=SIN(3)\nRSI_OFF()\n{handler}"), 2, vec![]),
         (format!("{begins}$IPO_MODE=#TCP\nWAIT SEC 1\n$IPO_MODE=#BASE\n{handler}"), 1, vec![tool]),
         (format!("{label}{jump}"), 1, vec![]),
         (format!("{label}RSI_ON()\n{jump}"), 0, vec![work]),

@@ -8,7 +8,7 @@ use crate::programs::scan::Reader;
 
 /// Frames that such a statement sets itself (`DO $BASE=..`), without a routine.
 const FRAMES: [&str; 2] = ["$TOOL", "$BASE"];
-/// Statements during which time passes, beside the motions.
+/// Statements during which time passes, beside motions and calls.
 const WAITS: [&str; 2] = ["WAIT", "HALT"];
 /// Why something is not known.
 const ANY_TIME: &str = "an interrupt or a trigger may set it at any time";

@@ -81,9 +81,11 @@ impl Module<'_> {
             self.now.0.is_sensed.set(false);
         } else if SENSOR_MOVES.contains(&name.as_str()) {
             self.way.lose(&mut self.now.1);
+            self.time_passes();
         } else if !is_still(&name) {
             self.way.may_go(&mut self.now.1);
             self.is_given(reader, &name, open);
+            self.time_passes();
         }
     }
 
