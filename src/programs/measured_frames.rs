@@ -101,8 +101,9 @@ fn known(own: StatedFrame, reason: LeftReason, word: &str, flag: &str) -> Unders
             Err(Why::new(reason, words))
         }
         StatedFrame::Several => {
-            let words =
-                format!("the {word} was measured, and these joints are used with several: give them a target for each");
+            let words = format!(
+                "the {word} was measured, and these joints are used with several, or with one that the text does not tell for certain: state it again before the motion, or give them a target for each"
+            );
             Err(Why::new(reason, words))
         }
     }
