@@ -132,8 +132,9 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
         }
     }
     let axes = axes(args, &controller.chain)?;
-    let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<_>>()?;
+    let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<Vec<_>>>()?;
     let language = language(args)?;
+    files.iter().try_for_each(is_text)?;
     let setting = ProgramSetting {
         chain: &controller.chain,
         axes: &axes,
@@ -277,16 +278,20 @@ fn text_file(path: &Path) -> Result<TextFile> {
     if let Some((what, remedy)) = programs::packed(&bytes) {
         return Err(Error::new(Code::ProgramLanguage, path.display(), what, remedy));
     }
-    if bytes.contains(&0) {
+    Ok(TextFile { name: path.display().to_string(), bytes })
+}
+
+fn is_text(file: &TextFile) -> Result<()> {
+    if file.bytes.contains(&0) {
         let what = "is not a text of single bytes (it holds zero bytes, as UTF-16 does)";
         return Err(Error::new(
             Code::TextEncoding,
-            path.display(),
+            &file.name,
             what,
             "save it as UTF-8 or as the controller writes it",
         ));
     }
-    Ok(TextFile { name: path.display().to_string(), bytes })
+    Ok(())
 }
 
 /// The readings of both chains are the same.

@@ -175,8 +175,10 @@ fn packed_files_are_named_as_what_they_are() {
             }
         }
     }
-    for (name, words) in [("p.ls", "FANUC"), ("p.jbi", "INFORM")] {
-        let file = cell.write(name, b"/PROG P\n");
+    for (name, bytes, words) in
+        [("p.ls", &b"/PROG P\n"[..], "FANUC"), ("p.tp", b"\x05\0\0\x01P\0", "FANUC"), ("p.jbi", b"/JOB\n", "INFORM")]
+    {
+        let file = cell.write(name, bytes);
         assert_says(&cell.compensate(&[&file], &[]).expect(2).said(), Code::ProgramLanguage, &[name, words, ".csv"]);
     }
 }
