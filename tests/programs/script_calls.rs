@@ -127,6 +127,11 @@ fn targets_of_an_arc_on_which_the_tool_is_turned_with_the_path_are_left() {
         (", mode=0", vec![]),
         (", 1.2, 0.25, 0, 1", kept.clone()),
         (", a=1.2, mode=1", kept.clone()),
+        (", a=1.2,\n    mode=0\n  ", vec![]),
+        (", a=1.2,\n    mode=1\n  ", kept.clone()),
+        (", acc=1.2, mode=1", kept.clone()),
+        (", acc=1.2", kept.clone()),
+        (", mode=0+m", kept.clone()),
         (", mode=m", kept),
     ] {
         assert_told(&cell, ("", &format!("  movec(@, @{mode})\n")), 2 - left.len(), &left);

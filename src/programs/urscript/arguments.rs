@@ -78,16 +78,19 @@ impl Script<'_> {
         points
     }
 
-    /// False where an arc may leave the orientation as it is to its path, whatever its targets say (`mode`).
+    /// False where `movec` may leave the orientation as it is to its path, whatever its targets say (`mode`).
     pub(super) fn turns_as_told(&mut self, open: usize, close: usize) -> bool {
         let start = self.reader.at;
         let places = self.places(&ARC, open, close);
         let is_told = match places {
             Some([.., Some(mode)]) => {
                 self.reader.at = mode;
-                self.reader.take_number().is_some_and(|(mode, _)| mode == 0.0)
+                let is_zero = self.reader.take_number().is_some_and(|(mode, _)| mode == 0.0);
+                self.reader.skip_line_ends();
+                is_zero && (self.reader.at == close || self.reader.is_mark(b','))
             }
-            _ => true,
+            Some(_) => true,
+            None => false,
         };
         self.reader.at = start;
         is_told
@@ -103,6 +106,7 @@ impl Script<'_> {
         let mut found = [None; N];
         self.reader.at = open + 1;
         for k in 0.. {
+            self.reader.skip_line_ends();
             if self.reader.at >= close {
                 break;
             }

@@ -322,7 +322,7 @@ impl Script<'_> {
                 "close it",
             ));
         };
-        let turns_as_told = way != Way::Arc || self.turns_as_told(open, close);
+        let turns_as_told = name != "movec" || self.turns_as_told(open, close);
         self.reader.at = open + 1;
         for k in 0..count {
             if self.reader.at >= close {
