@@ -248,6 +248,11 @@ fn a_work_object_that_may_be_handed_on_or_not_is_not_known() {
         (go("MoveL @,v1\\V?x,z1,tGun\\TLoad?load\\WObj:=wTable;"), vec![], 1, vec![]),
         (go("MoveL\\Conc?x,@,v1,z1,tGun\\WObj:=wTable;"), vec![], 1, vec![]),
         (go("CapL p1,v1,tGun\\WObj?w;"), all.to_vec(), 0, vec![LeftReason::Unvisited.name()]),
+        // A computed one is not told anywhere.
+        ("MoveL @,v1,z1,tGun\\WObj:=(wA);".to_owned(), vec![], 0, vec![frame]),
+        ("MoveL @,v1,z1,tGun\\WObj:=(wA);".to_owned(), all.to_vec(), 1, vec![]),
+        ("MoveL @,v1,z1,tGun\\WObj:=wList{i};".to_owned(), vec![], 0, vec![frame]),
+        ("MoveL @,v1,z1,tGun\\WObj:=wList{i};".to_owned(), all.to_vec(), 1, vec![]),
     ] {
         let told = run(&cell, &body, &flags).1.told();
         let found: Vec<&str> = told.left.iter().map(|(.., reason)| reason.as_str()).collect();

@@ -65,7 +65,11 @@ impl Task<'_> {
             None => return Ok(Pose::identity()),
             Some(Node::Word(name)) if name == WORLD => return Ok(Pose::identity()),
             Some(Node::Word(name)) => name,
-            Some(_) => return Err(Untold::Elsewhere(why("its work object is computed".into()))),
+            Some(Node::Perhaps) => {
+                return Err(Untold::Several(why("its work object is one that may be handed on or not".into())));
+            }
+            Some(Node::List(_)) => return Err(Untold::Several(why("its work object is written in the move".into()))),
+            Some(_) => return Err(Untold::Nowhere(why("its work object is computed (give --work)".into()))),
         };
         let datum = self.frame_datum(name, "WOBJDATA");
         if datum.is_some_and(|work| work.says(0, "TRUE") || work.says(1, "FALSE")) {
@@ -85,6 +89,7 @@ impl Task<'_> {
 /// Why the numbers of a tool or a work object are not known.
 fn untold(name: &str, datum: Option<&Datum>, flag: &str) -> String {
     match datum {
+        None if name.ends_with("{}") => format!("which element of {name} it is is computed (give {flag})"),
         None => format!("{name} is in none of the files (give its module as well, or {flag})"),
         Some(Datum { changed: Some(by), .. }) => {
             format!("{name} may not be what its declaration says: {by} (give {flag})")

@@ -183,7 +183,7 @@ fn switch(reader: &mut Reader<'_>) -> Result<(String, Option<Node>)> {
     reader.at += 1;
     if reader.take_mark(b'?') {
         reader.at += 1;
-        return Ok((name, Some(Node::Other)));
+        return Ok((name, Some(Node::Perhaps)));
     }
     let has_value = reader.take_mark(b':') && reader.take_mark(b'=');
     let value = has_value.then(|| node(reader)).transpose()?;

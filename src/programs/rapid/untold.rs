@@ -8,6 +8,8 @@ use crate::programs::reason::Why;
 pub(super) enum Untold {
     /// The text does not tell it: the one that the user states stands for it.
     Nowhere(Why),
+    /// One of several, or perhaps none: no other stands for it.
+    Several(Why),
     /// It is none of the robot, or none that stands still: no other stands for it.
     Elsewhere(Why),
 }
@@ -17,7 +19,7 @@ impl Untold {
     pub fn or_stated(self, stated: Option<Pose>) -> Understood<Pose> {
         match self {
             Self::Nowhere(why) => stated.ok_or(why),
-            Self::Elsewhere(why) => Err(why),
+            Self::Several(why) | Self::Elsewhere(why) => Err(why),
         }
     }
 }
@@ -26,6 +28,7 @@ impl Untold {
 pub(super) fn beside(none: &Pose, known: Result<Pose, Untold>, stated: Option<Pose>) -> StatedFrame {
     match known {
         Err(Untold::Elsewhere(_)) => StatedFrame::Elsewhere,
+        Err(Untold::Several(_)) => StatedFrame::Several,
         known => StatedFrame::beside(none, known.ok().or(stated)),
     }
 }

@@ -28,7 +28,7 @@ impl Task<'_> {
             if is_switch && reader.take_mark(b'?') {
                 // What it hands on may be there or not.
                 reader.at += 1;
-                work = if word == "WOBJ" { Some(Node::Other) } else { work };
+                work = if word == "WOBJ" { Some(Node::Perhaps) } else { work };
                 continue;
             }
             let assigned = is_switch && reader.is_mark(b':') && reader.ahead_is_mark(1, b'=');

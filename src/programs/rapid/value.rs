@@ -18,6 +18,8 @@ pub(super) enum Node {
     Word(String),
     /// `Offs(..)` or `RelTool(..)`: a name, and what is in the brackets.
     DisplacedTarget(Box<Displacement>),
+    /// `\WObj?w`: what the routine was given, or nothing.
+    Perhaps,
     Other,
 }
 
