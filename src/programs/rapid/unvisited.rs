@@ -41,7 +41,11 @@ impl Task<'_> {
                 names.push(element(reader, word));
             }
         }
-        let is_point = |name: &&String| self.data.get(*name).is_some_and(|d| d.kind == "ROBTARGET");
+        // Axis angles with which something is computed are what they are.
+        let is_point = |name: &&String| {
+            let kind = self.data.get(*name).map_or("", |d| &d.kind);
+            kind == "ROBTARGET" || (kind == "JOINTTARGET" && !computes)
+        };
         let points: Vec<String> = names.iter().filter(is_point).cloned().collect();
         let tool = names.into_iter().find(|name| self.is_tool(name));
         for point in points {
