@@ -124,7 +124,9 @@ fn a_script_says_whether_stating_the_tool_helps() {
         (String::new(), true),
         (format!("{set}  if a:\n  {other}  end\n"), false),
         (format!("{set}  thread t():\n  {other}  end\n  h = run t()\n"), false),
-        ("  set_tcp(get_target_tcp_offset())\n".to_owned(), false),
+        ("  set_tcp(get_target_tcp_offset())\n".to_owned(), true),
+        (format!("{set}  set_tcp(get_target_tcp_offset())\n"), true),
+        (format!("{set}  if a:\n    set_tcp(get_target_tcp_offset())\n  end\n"), false),
     ] {
         let text = format!("def p():\n  movej({q:?})\n{before}  movel({pose})\nend\n");
         let file = cell.write("a.script", text.as_bytes());

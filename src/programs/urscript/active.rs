@@ -39,7 +39,7 @@ impl ToolIs {
         let words = match self {
             Self::Known(pose) => return Ok(*pose),
             Self::Unset => "no set_tcp(p[..]) before it; give --tool",
-            Self::Computed => "the set_tcp before it is computed, not written in numbers",
+            Self::Computed => "the set_tcp before it is computed, not written in numbers; give --tool",
             Self::Several(why) => why,
         };
         Err(Why::new(LeftReason::ToolUnknown, format!("its tool is not known: {words}")))

@@ -145,7 +145,10 @@ impl Script<'_> {
         }
         found.tool = match self.argument()? {
             Value::Pose(fields, _) => Ok(pose_of(&fields)),
-            _ => Err(Why::new(LeftReason::ToolUnknown, "the tcp of its get_inverse_kin is not written in numbers")),
+            _ => self.setting.tool.ok_or_else(|| {
+                let words = "the tcp of its get_inverse_kin is not written in numbers; give --tool";
+                Why::new(LeftReason::ToolUnknown, words)
+            }),
         };
         Ok(())
     }

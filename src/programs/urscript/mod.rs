@@ -219,7 +219,7 @@ impl Script<'_> {
                 let value = self.argument()?;
                 self.now.0.tool.set(match &value {
                     Value::Pose(fields, _) => ToolIs::Known(pose_of(fields)),
-                    _ => ToolIs::Computed,
+                    _ => self.setting.tool.map_or(ToolIs::Computed, ToolIs::Known),
                 });
             } else if next == Some(TokenKind::Mark(b'='))
                 && self.reader.ahead(2).map(|t| t.kind) != Some(TokenKind::Mark(b'='))
