@@ -78,6 +78,39 @@ fn krl(pose: &Pose) -> String {
     format!("{{X {x:.6},Y {y:.6},Z {z:.6},A {a:.7},B {b:.7},C {c:.7}}}")
 }
 
+/// `READINGS` as numbers of degrees.
+fn degrees() -> [String; 6] {
+    READINGS.map(|q| format!("{:.6}", q.to_degrees()))
+}
+
+fn krl_axes() -> String {
+    let axes: Vec<String> = (1..=6).zip(degrees()).map(|(k, q)| format!("A{k} {q}")).collect();
+    format!("{{{}}}", axes.join(","))
+}
+
+fn jointtarget() -> String {
+    format!("[[{}],[9E9,9E9,9E9,9E9,9E9,9E9]]", degrees().join(","))
+}
+
+fn rapid(pose: &Pose) -> String {
+    let ([x, y, z], [qx, qy, qz, qw]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
+    format!("[[{x},{y},{z}],[{qw},{qx},{qy},{qz}]]")
+}
+
+/// Held by the robot or not.
+fn tooldata(name: &str, held: &str, pose: &Pose) -> String {
+    format!("PERS tooldata {name}:=[{held},{},[1,[0,0,0],[1,0,0,0],0,0,0]];\n", rapid(pose))
+}
+
+/// Standing still or moved by a unit.
+fn wobjdata(name: &str, stands: &str, pose: &Pose) -> String {
+    format!("PERS wobjdata {name}:=[FALSE,{stands},\"\",{},[[0,0,0],[1,0,0,0]]];\n", rapid(pose))
+}
+
+fn module(data: &str, body: &str) -> String {
+    format!("MODULE m\n{data}PROC main()\n{body}\nENDPROC\nENDMODULE\n")
+}
+
 fn moved(pose: &Pose, x: f64) -> Pose {
     Pose::new(Matrix3::identity(), Vector3::new(x, 0.0, 0.0)) * *pose
 }
@@ -203,9 +236,7 @@ fn joints_take_the_tool_of_their_text() {
     let to = RobotFrames { tool: Some(MeasuredTool::Pose(tool)), work: None };
     let done =
         |name: &str, text: &str| corrected(&cell, name, text, to, &Stated { tool: Some(near), ..Stated::default() });
-    let deg = READINGS.map(|q| format!("{:.6}", q.to_degrees()));
-    let axes = (1..=6).zip(&deg).map(|(k, q)| format!("A{k} {q}")).collect::<Vec<_>>().join(",");
-    let go = |tool: &Pose| format!("$TOOL={}\nPTP {{{axes}}}\n", krl(tool));
+    let go = |tool: &Pose| format!("$TOOL={}\nPTP {}\n", krl(tool), krl_axes());
     let of_krl = |body: String| done("a.src", &format!("DEF a()\n{body}END\n"));
     let left_with_another: Option<LeftReason> = Some(LeftReason::ToolUnknown);
     assert_eq!(left(&of_krl(go(&near) + &go(&other))), [None, left_with_another]);
@@ -216,17 +247,8 @@ fn joints_take_the_tool_of_their_text() {
     let wanted = cell.nominal.base_from_tip(&READINGS) * near * tool.inverse();
     assert_meets(&cell.real.base_from_tip(&correction.corrected), &wanted, "its own tool");
 
-    let [qw, qx, qy, qz] = {
-        let [x, y, z, w] = other.quaternion_xyzw();
-        [w, x, y, z]
-    };
-    let [x, y, z] = other.xyz().map(|v| 1e3 * v);
-    let data = format!("[TRUE,[[{x},{y},{z}],[{qw},{qx},{qy},{qz}]],[1,[0,0,0],[1,0,0,0],0,0,0]]");
-    let place = format!("[[{}],[9E9,9E9,9E9,9E9,9E9,9E9]]", deg.join(","));
-    let rapid = format!(
-        "MODULE m\nPERS tooldata t2:={data};\nCONST jointtarget j1:={place};\nPROC main()\nMoveAbsJ j1,v100,fine,t2;\nENDPROC\nENDMODULE\n"
-    );
-    assert_eq!(left(&done("m.mod", &rapid)), [left_with_another]);
+    let data = format!("{}CONST jointtarget j1:={};\n", tooldata("t2", "TRUE", &other), jointtarget());
+    assert_eq!(left(&done("m.mod", &module(&data, "MoveAbsJ j1,v100,fine,t2;"))), [left_with_another]);
     let script = |tool: &Pose| {
         let axis = nalgebra::Rotation3::from_matrix(&tool.rotation).scaled_axis();
         let [x, y, z] = tool.xyz();
@@ -245,10 +267,9 @@ fn joints_used_with_two_tools_are_left() {
     let cell = Cell::kuka(317);
     let tool = Pose::from_xyz_rpy([0.01, -0.02, 0.15], [0.0, 0.4, 1.2]);
     let to = RobotFrames { tool: Some(MeasuredTool::Pose(tool)), work: None };
-    let axes = (1..=6).zip(READINGS).map(|(k, q)| format!("A{k} {:.6}", q.to_degrees())).collect::<Vec<_>>().join(",");
     let of = |tools: [&Pose; 2]| {
         let goes: String = tools.iter().map(|t| format!("$TOOL={}\nPTP XP1\n", krl(t))).collect();
-        let text = format!("DEF a()\nDECL E6AXIS XP1={{{axes}}}\n{goes}END\n");
+        let text = format!("DEF a()\nDECL E6AXIS XP1={}\n{goes}END\n", krl_axes());
         left(&corrected(&cell, "a.src", &text, to, &Stated::default()))
     };
     let other = moved(&tool, 0.1);
@@ -265,17 +286,12 @@ fn joints_of_a_tool_in_the_room_or_of_one_of_several_are_left() {
     let of = |name: &str, text: &str, stated: &Pose| {
         left(&corrected(&cell, name, text, to, &Stated { tool: Some(*stated), ..Stated::default() }))
     };
-    let deg = READINGS.map(|q| format!("{:.6}", q.to_degrees()));
-    let axes = (1..=6).zip(&deg).map(|(k, q)| format!("A{k} {q}")).collect::<Vec<_>>().join(",");
-    let place = format!("[[{}],[9E9,9E9,9E9,9E9,9E9,9E9]]", deg.join(","));
     let (unknown, other) = (Some(LeftReason::ToolUnknown), moved(&tool, 0.1));
-    for (held, wanted) in [("TRUE", unknown), ("FALSE", unknown)] {
-        let data = format!("[{held},[[100,0,0],[1,0,0,0]],[1,[0,0,0],[1,0,0,0],0,0,0]]");
-        let text =
-            format!("MODULE m\nPERS tooldata t:={data};\nPROC main()\nMoveAbsJ {place},v1,z1,t;\nENDPROC\nENDMODULE\n");
-        assert_eq!(of("m.mod", &text, &tool), [wanted], "{held}");
+    for (held, wanted) in [("TRUE", None), ("FALSE", unknown)] {
+        let go = format!("MoveAbsJ {},v1,z1,t;", jointtarget());
+        assert_eq!(of("m.mod", &module(&tooldata("t", held, &tool), &go), &tool), [wanted], "{held}");
     }
-    let go = format!("PTP {{{axes}}}");
+    let go = format!("PTP {}", krl_axes());
     let set = |tool: &Pose| format!("$TOOL={}\n", krl(tool));
     let maybe = |first: &Pose, second: &Pose| format!("{}IF $IN[1] THEN\n{}ENDIF\n{go}", set(first), set(second));
     for (body, wanted) in [
@@ -289,7 +305,23 @@ fn joints_of_a_tool_in_the_room_or_of_one_of_several_are_left() {
     }
     let q = READINGS.map(|q| q.to_string()).join(",");
     let script = |body: &str| format!("def a():\n{body}  movej([{q}])\nend\n");
-    for (body, wanted) in [("", None), ("  if x:\n    set_tcp(p[0.3,0,0,0,0,0])\n  end\n", unknown)] {
+    for (body, wanted) in
+        [("", None), ("  set_tcp(f())\n", None), ("  if x:\n    set_tcp(p[0.3,0,0,0,0,0])\n  end\n", unknown)]
+    {
         assert_eq!(of("a.script", &script(body), &tool), [wanted], "{body}");
+    }
+}
+
+/// Work that a unit moves is none that another one stands for; the measured one is.
+#[test]
+fn joints_on_work_that_a_unit_moves_are_left() {
+    let cell = Cell::kuka(319);
+    let work = Pose::from_xyz_rpy([0.4, 0.1, 0.2], [0.0, 0.0, 0.3]);
+    let to = RobotFrames { tool: None, work: Some(work) };
+    let go = format!("MoveAbsJ {},v1,z1,tool0\\WObj:=w;", jointtarget());
+    for (stands, wanted) in [("TRUE", None), ("FALSE", Some(LeftReason::FrameUnknown))] {
+        let text = module(&wobjdata("w", stands, &work), &go);
+        let stated = Stated { work: Some(work), ..Stated::default() };
+        assert_eq!(left(&corrected(&cell, "m.mod", &text, to, &stated)), [wanted], "{stands}");
     }
 }
