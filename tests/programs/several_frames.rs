@@ -325,3 +325,31 @@ fn joints_on_work_that_a_unit_moves_are_left() {
         assert_eq!(left(&corrected(&cell, "m.mod", &text, to, &stated)), [wanted], "{stands}");
     }
 }
+
+/// Joints to which only an instruction goes that is no known move have the tool and the work object that it names.
+#[test]
+fn joints_of_an_unknown_instruction_have_the_frames_that_it_names() {
+    let cell = Cell::kuka(320);
+    let tool = Pose::from_xyz_rpy([0.01, -0.02, 0.15], [0.0, 0.4, 1.2]);
+    let work = Pose::from_xyz_rpy([0.4, 0.1, 0.2], [0.0, 0.0, 0.3]);
+    let other = |pose: &Pose| moved(pose, 0.2);
+    let to = RobotFrames { tool: Some(MeasuredTool::Pose(tool)), work: Some(work) };
+    let [t, w] = [tooldata("t1", "TRUE", &tool), wobjdata("w1", "TRUE", &work)];
+    let [t2, w2] = [tooldata("t2", "TRUE", &other(&tool)), wobjdata("w2", "TRUE", &other(&work))];
+    let data = format!("{t}{t2}{w}{w2}CONST jointtarget j1:={};\n", jointtarget());
+    let is_measured = Stated { tool: Some(tool), work: Some(work), ..Stated::default() };
+    let is_other = Stated { tool: Some(other(&tool)), work: Some(other(&work)), ..Stated::default() };
+    let (no_tool, no_work) = (Some(LeftReason::ToolUnknown), Some(LeftReason::FrameUnknown));
+    for (body, stated, wanted) in [
+        ("CapAbsJ j1,v1,z1,t1\\WObj:=w1;", &Stated::default(), None),
+        ("CapAbsJ j1,v1,z1,t1\\WObj:=w1;", &is_other, None),
+        ("CapAbsJ j1,v1,z1,t2\\WObj:=w1;", &is_measured, no_tool),
+        ("CapAbsJ j1,v1,z1,t1\\WObj:=w2;", &is_measured, no_work),
+        ("CapAbsJ j1,v1,z1,t1;", &is_measured, None),
+        ("CapAbsJ j1,v1,z1,t2;", &is_measured, no_tool),
+        ("CapAbsJ j1,v1,z1,t1\\WObj:=w1;\nCapAbsJ j1,v1,z1,t2\\WObj:=w1;", &is_measured, no_tool),
+        ("p1:=CalcRobT(j1,t2\\WObj:=w2);", &is_measured, None),
+    ] {
+        assert_eq!(left(&corrected(&cell, "m.mod", &module(&data, body), to, stated)), [wanted], "{body}");
+    }
+}

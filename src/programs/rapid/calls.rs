@@ -218,7 +218,7 @@ impl Task<'_> {
     /// True for an instruction that names a tool, and a point or a work object behind `\WObj`: it goes somewhere with them, and what moves the
     /// robot reads its tool and its work object.
     fn goes(&self, call: &Call) -> bool {
-        let is_point = |name: &str| self.data.get(variable(name)).is_some_and(|d| d.kind == "ROBTARGET");
+        let is_point = |name: &str| self.data.get(variable(name)).is_some_and(|d| d.kind.ends_with("TARGET"));
         let is_work = |which: &Which| matches!(which, Which::Named(name) if name == WORK);
         call.calling == Calling::Instruction
             && call.given.iter().any(|given| is_point(&given.name) || is_work(&given.which))
