@@ -39,9 +39,7 @@ pub(super) fn check(Adjustment { problem, state }: &Adjustment, setting: &CheckC
         let others = HandEye { camera: state.mountings[mounting], plate: state.placements[placement] };
         let (images, seen): (Vec<usize>, Vec<SeenStop>) = wrong.into_iter().unzip();
         let found = agreement(&state.robot, &others, &seen, setting.limits)?;
-        let members: Vec<usize> = found.members.iter().map(|&k| images[k]).collect();
-        let by_turns = stand_between(problem, &members);
-        Some(BodyMoved { by_turns, ..BodyMoved::of(problem, &images, found)? })
+        BodyMoved::of(problem, &images, found)
     };
     groups.into_iter().filter_map(moved).collect()
 }
@@ -72,7 +70,8 @@ impl BodyMoved {
         let (early, late) = if neighbour > to { (to, neighbour) } else { (neighbour, from) };
         let name = |i: usize| problem.images[i].name.clone();
         let between = [name(early), name(late)];
-        Some(Self { moved: found.moved, between, images: images.into_iter().map(name).collect(), by_turns: false })
+        let by_turns = stand_between(problem, &images);
+        Some(Self { moved: found.moved, between, images: images.into_iter().map(name).collect(), by_turns })
     }
 }
 
