@@ -106,9 +106,14 @@ pub const CHECKS: &[Check] = &[
     check("undetermined", Stage::Uncertainty(|a, b, s| found(undetermined::check(a, b, s)))),
 ];
 
-/// True of what readings computed from poses of a tool, or in a frame, look like: there they are the finding.
-pub fn follows_from_tool(finding: &Finding) -> bool {
-    matches!(finding, Finding::JointNoiseLarge(_) | Finding::LooseMounting(_) | Finding::NoGain(_))
+/// True of what readings computed from poses of a tool, or in a frame, look like: there they are the finding. `mountings`: names of those of
+/// the series with such poses; another is loose by itself.
+pub fn follows_from_tool(finding: &Finding, mountings: &[&str]) -> bool {
+    match finding {
+        Finding::JointNoiseLarge(_) | Finding::NoGain(_) => true,
+        Finding::LooseMounting(loose) => mountings.contains(&loose.mounting.as_str()),
+        _ => false,
+    }
 }
 
 /// What the checks have found so far.
@@ -187,5 +192,21 @@ impl<'a> Diagnosis<'a> {
         let refusal = all().find(|f| f.weight() == Weight::Refusal)?;
         let moved = all().find(|f| matches!(f, Finding::BodyMoved(_)));
         Some(moved.unwrap_or(refusal).refusal())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::LooseMounting;
+
+    #[test]
+    fn a_camera_of_another_series_is_loose_whatever_the_poses_of_one_are() {
+        let loose = |mounting: &str| {
+            let (mounting, images) = (mounting.to_owned(), Vec::new());
+            Finding::from(LooseMounting { mounting, turn: "yaw", angle_rad: 0.01, spread_rad: 0.001, images, of: 20 })
+        };
+        assert!(follows_from_tool(&loose("of_poses"), &["of_poses"]));
+        assert!(!follows_from_tool(&loose("of_joints"), &["of_poses"]));
     }
 }

@@ -81,7 +81,9 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     solution.findings.extend(notices.into_iter().map(Into::into));
     solution.findings.extend(of_postures.map(|t| t.finding(series, &told).into()));
     if let Some(tool) = of_tool(&rigid, &told, options) {
-        solution.findings.retain(|other| !follows_from_tool(other));
+        let of_tool = told.iter().filter(|series| tool.series.contains(&series.name));
+        let mountings: Vec<&str> = of_tool.map(|series| series.mounting.as_str()).collect();
+        solution.findings.retain(|other| !follows_from_tool(other, &mountings));
         solution.findings.push(tool.into());
     }
     let losses = lens_choice::losses(&solution);
