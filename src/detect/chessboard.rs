@@ -3,7 +3,7 @@
 //! The lattice of corners comes from the `calib-targets` library; which corner is which, the sub-pixel position in the
 //! full depth of the picture and its covariance are found here.
 
-use std::cell::LazyCell;
+use std::cell::{LazyCell, OnceCell};
 
 use calib_targets_chessboard::{ChessboardCorner, ChessboardDetection, ChessboardDetector, ChessboardParams};
 
@@ -37,40 +37,38 @@ const LARGE_PX: usize = 500_000;
 /// places. A board of another size is a failure of the detection.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
-    let lattice = find_lattice(picture, board).ok_or_else(no_board)?;
-    let largest = on_lattice(picture, lattice, board);
+    let seen = Lattices::of(picture);
+    let largest = on_lattice(picture, seen.largest(board).ok_or_else(no_board)?, board);
     match &largest {
         Ok(detection) if detection.failure.is_none() => largest,
-        _ => beside(picture, board).map_or(largest, Ok),
+        _ => beside(picture, &seen, board).map_or(largest, Ok),
     }
 }
 
 /// The stated board from end to end beside a larger one.
-fn beside(picture: &Picture, board: BoardSize) -> Option<Detection> {
-    let bytes = Bytes::of(picture);
-    let scales = scales(picture).into_iter();
-    let mut lattices = scales.flat_map(|scale| lattices(&bytes, scale).into_iter().skip(1));
-    lattices.find_map(|lattice| {
-        BoardSeen::of(picture, &lattice).filter(|seen| seen.is(board))?;
+fn beside(picture: &Picture, seen: &Lattices, board: BoardSize) -> Option<Detection> {
+    seen.smaller().find_map(|lattice| {
+        BoardSeen::of(picture, lattice).filter(|seen| seen.is(board))?;
         let found = on_lattice(picture, lattice, board).ok()?;
-        (found.failure.is_none() && found.outline == Outline::Whole).then_some(found)
+        let is_whole = found.failure.is_none() && found.outline == Outline::Whole;
+        is_whole.then_some(Detection { outline: Outline::Beside, ..found })
     })
 }
 
-fn on_lattice(picture: &Picture, lattice: Lattice, board: BoardSize) -> Result<Detection> {
-    let ends = LazyCell::new(|| Ends::of(picture, &lattice));
+fn on_lattice(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Result<Detection> {
+    let ends = LazyCell::new(|| Ends::of(picture, lattice));
     let placed = |labelling: Labelling| Some((labelling, labelling.placement()?));
     let by_ends = || placed(ends.as_ref()?.place(board)?);
-    let measured = |placement: Placement| measure(picture, &lattice, placement, WINDOW);
-    let by_colours = label(picture, &lattice, board);
+    let measured = |placement: Placement| measure(picture, lattice, placement, WINDOW);
+    let by_colours = label(picture, lattice, board);
     let Some((mut labelling, placement)) = placed(by_colours).or_else(by_ends) else {
         let why = if by_colours == Labelling::Ambiguous { ambiguous() } else { contradiction(board) };
-        return refusal(picture, &lattice, board, why);
+        return refusal(picture, lattice, board, why);
     };
     let mut detection = measured(placement);
     // Light that hides a line looks like the end of the board: what is taken for hidden may as well be what is taken for paper.
     if detection.outline == Outline::LineMissing && ends.is_none_or(|ends| !ends.leave_only(board, placement)) {
-        let Some((other, placement)) = by_ends() else { return refusal(picture, &lattice, board, ambiguous()) };
+        let Some((other, placement)) = by_ends() else { return refusal(picture, lattice, board, ambiguous()) };
         (labelling, detection) = (other, measured(placement));
     }
     let mut notices = Vec::new();
@@ -78,7 +76,7 @@ fn on_lattice(picture: &Picture, lattice: Lattice, board: BoardSize) -> Result<D
         notices.push(symmetric_notice(board));
     }
     if detection.outline == Outline::LineMissing {
-        detection.size_seen = BoardSeen::of(picture, &lattice).and_then(|seen| seen.size());
+        detection.size_seen = BoardSeen::of(picture, lattice).and_then(|seen| seen.size());
         notices.push(hidden_line(board));
     }
     detection.notices = notices;
@@ -106,22 +104,47 @@ pub(super) fn board_size(plate: &Plate) -> Result<BoardSize> {
     }
 }
 
-/// The largest regular lattice of saddle points: sought in the picture at one size, and at the next unless that shows as many corners
-/// as the board has. Large pictures begin with half their size, where there are fewer pixels and a sharpened edge is one step; in small ones
-/// squares may be too small for the finder.
+/// The largest regular lattice of saddle points in a picture, see [`Lattices::largest`].
 pub(super) fn find_lattice(picture: &Picture, board: BoardSize) -> Option<Lattice> {
-    let bytes = Bytes::of(picture);
-    let mut best: Option<Lattice> = None;
-    for scale in scales(picture) {
-        let Some(lattice) = lattices(&bytes, scale).into_iter().next() else { continue };
-        if best.as_ref().is_none_or(|other| lattice.len() >= other.len()) {
-            best = Some(lattice);
-        }
-        if best.as_ref().is_some_and(|found| found.len() >= (board.columns * board.rows) as usize) {
-            break;
-        }
+    Lattices::of(picture).largest(board).cloned()
+}
+
+/// The regular lattices of saddle points of a picture: sought once at every size, when they are asked for.
+struct Lattices {
+    bytes: Bytes,
+    by_scale: [(f64, OnceCell<Vec<Lattice>>); 2],
+}
+
+impl Lattices {
+    fn of(picture: &Picture) -> Self {
+        Self { bytes: Bytes::of(picture), by_scale: scales(picture).map(|scale| (scale, OnceCell::new())) }
     }
-    best
+
+    /// Of one size of the picture after the other.
+    fn by_scale(&self) -> impl Iterator<Item = &[Lattice]> {
+        self.by_scale.iter().map(|(scale, found)| found.get_or_init(|| lattices(&self.bytes, *scale)).as_slice())
+    }
+
+    /// The largest: sought in the picture at one size, and at the next unless that shows as many corners as the board has. Large pictures
+    /// begin with half their size, where there are fewer pixels and a sharpened edge is one step; in small ones squares may be too small for
+    /// the finder.
+    fn largest(&self, board: BoardSize) -> Option<&Lattice> {
+        let mut best: Option<&Lattice> = None;
+        for lattice in self.by_scale().filter_map(<[Lattice]>::first) {
+            if best.is_none_or(|other| lattice.len() >= other.len()) {
+                best = Some(lattice);
+            }
+            if best.is_some_and(|found| found.len() >= (board.columns * board.rows) as usize) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Those beside the largest of either size.
+    fn smaller(&self) -> impl Iterator<Item = &Lattice> {
+        self.by_scale().flat_map(|found| found.iter().skip(1))
+    }
 }
 
 /// Sizes of the picture at which lattices are sought, one after the other.

@@ -52,6 +52,8 @@ pub enum Outline {
     Open,
     /// All four outer lines of corners were found, or a tag in each.
     Whole,
+    /// The same beside a larger board, of which another image may show a part alone.
+    Beside,
     /// An outer line of corners is not where it should be in view: it is covered, or the board is smaller than the plate says.
     LineMissing,
     /// The same of tags, or of corners beside tags, whose numbers tell their places all the same.

@@ -175,8 +175,8 @@ fn refuse_odd_dots(images: &[PathBuf], found: &mut [SeriesImage]) {
 fn refuse_unproven_boards(images: &[PathBuf], plate: &Plate, found: &mut [SeriesImage]) {
     let of = |outline: Outline| found.iter().find(|i| i.detection.outline == outline);
     let beyond = of(Outline::Beyond);
-    if of(Outline::Whole).is_some() && beyond.is_none() {
-        return;
+    if of(Outline::Whole).or_else(|| of(Outline::Beside)).is_some() && beyond.is_none() {
+        return refuse_parts_of_another(images, found);
     }
     let other = beyond.or_else(|| of(Outline::OtherSize)).and_then(|i| i.detection.failure.clone());
     let missing = || found.iter().filter(|i| i.detection.outline == Outline::LineMissing);
@@ -190,6 +190,21 @@ fn refuse_unproven_boards(images: &[PathBuf], plate: &Plate, found: &mut [Series
     for (path, image) in images.iter().zip(found).filter(|(_, image)| in_doubt(image)) {
         image.detection.observations.clear();
         image.detection.failure = Some(Error { place: path.display().to_string(), ..error.clone() });
+    }
+}
+
+/// Where some images show the stated board whole, and one another board: what is seen in part may be of either.
+fn refuse_parts_of_another(images: &[PathBuf], found: &mut [SeriesImage]) {
+    let shows_another = |i: &SeriesImage| [Outline::Beside, Outline::OtherSize].contains(&i.detection.outline);
+    let Some(at) = found.iter().position(shows_another) else { return };
+    let what = format!("another board is in view of {}: this may be a part of it", images[at].display());
+    let remedy = "take the other board out of view, or take the image so that all of the stated one is in view";
+    let is_part = |i: &SeriesImage| [Outline::Open, Outline::LineMissing].contains(&i.detection.outline);
+    for (path, image) in images.iter().zip(found) {
+        if is_part(image) && image.detection.failure.is_none() {
+            image.detection.observations.clear();
+            image.detection.failure = Some(Error::new(Code::PlateIncomplete, path.display(), &what, remedy));
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use crate::said::{Said, assert_says};
 use robotcal::Code;
-use robotcal::detect::{detect, load};
+use robotcal::detect::{detect, detect_series, load};
 use robotcal::series::{Observation, Source, read};
 
 fn root() -> &'static Path {
@@ -368,4 +368,29 @@ fn the_stated_chessboard_is_found_beside_a_larger_one() {
         detect(&load(&picture, None).unwrap(), &plate).unwrap().observations.len()
     };
     assert_eq!((count(&large), count(&small)), (54, 20));
+    // Of the large one no more corners than the small one has, with two of its ends: alone they could be those of the stated one.
+    let plates = [&large, &small].map(|board| board.join("plate.toml"));
+    let [of_large, stated] = plates.map(|path| robotcal::series::read_plate(&path, &mut Vec::new()).unwrap());
+    let corners = detect(&load(&picture, None).unwrap(), &of_large).unwrap().observations;
+    let [first, next] = [0, 10].map(|id| corners.iter().find(|corner| corner.marker == id).unwrap().uv);
+    let seen = |paths: &[PathBuf]| detect_series(paths, &stated, |path| load(path, None), |_| {});
+    let mut alone = 0;
+    for [columns, rows] in [[5, 3], [4, 3], [5, 2], [4, 4]] {
+        let cut = folder.path().join("cut.png");
+        let mut part = image::GrayImage::from_pixel(width, height, image::Luma([255]));
+        let from = [9 - columns, 6 - rows].map(|k| f64::from(k) - 0.5);
+        let [x, y] = [0, 1].map(|axis| (first[axis] + from[axis] * (next[axis] - first[axis])) as i64);
+        image::imageops::replace(&mut part, &left, -x, -y);
+        part.save(&cut).unwrap();
+        let found = seen(std::slice::from_ref(&cut))[0].detection.observations.len();
+        alone += found;
+        let of_both = seen(&[picture.clone(), cut]);
+        let [whole, part] = [0, 1].map(|k| &of_both[k].detection);
+        assert_eq!(whole.observations.len(), 20, "{:?}", whole.failure);
+        assert!(part.observations.is_empty(), "{columns} x {rows}");
+        if found > 0 {
+            assert_says(part.failure.as_ref().unwrap(), Code::PlateIncomplete, &["cut.png", "both.png"]);
+        }
+    }
+    assert!(alone > 0);
 }
