@@ -10,12 +10,14 @@ use super::size_seen::{line_missing, nowhere_whole};
 use super::{Detection, Outline, Picture, examine, other_kind, tags};
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{batches, is_turned_by_viewers, picture_size};
-use crate::series::{Plate, PlateKind};
+use crate::series::{Plate, PlateKind, spread};
 
 /// Of a picture of three colours and its grey values.
 const BYTES_PER_PX: u64 = 7;
 /// Memory of pictures that are looked at together, bytes.
 const MOST_IN_FLIGHT: u64 = 1 << 30;
+/// Images, or a few more, in which a plate of another kind is looked for.
+const MOST_LOOKED_AT: usize = 8;
 
 /// One image of a series with what was found in it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -106,44 +108,51 @@ pub fn detect_series(
     refuse_odd_sizes(images, &mut found);
     refuse_odd_dots(images, &mut found);
     if !found.iter().any(shows) {
-        name_other_kinds(images, plate, &picture, &mut found);
+        name_other_kind(images, plate, &picture, &mut found);
     }
     found
 }
 
-/// Where no image shows the plate, one of another kind may be in view.
-fn name_other_kinds(
+/// Where no image shows the plate, one of another kind may be in view. Some images are looked at, up to the first that shows one; it stands for
+/// all that fail like that one.
+fn name_other_kind(
     images: &[PathBuf],
     plate: &Plate,
     picture: impl Fn(&Path) -> Result<Picture> + Sync,
     found: &mut [SeriesImage],
 ) {
-    let failure = |image: &SeriesImage| image.detection.failure.clone().filter(|_| image.size.is_some());
-    let failures: BTreeMap<&Path, Error> =
-        images.iter().zip(&*found).filter_map(|(path, image)| Some((path.as_path(), failure(image)?))).collect();
-    let paths: Vec<&Path> = failures.keys().copied().collect();
-    let looked = in_batches(&paths, |path| {
-        let seen = picture(path).ok().zip(failures.get(path));
-        let named = seen.and_then(|(seen, why)| other_kind::named(&seen, plate, why));
-        named.map_or_else(SeriesImage::default, SeriesImage::failed)
-    });
-    let looked: BTreeMap<&Path, SeriesImage> = paths.into_iter().zip(looked).collect();
-    for (path, image) in images.iter().zip(found) {
-        if let Some(named) = looked.get(path.as_path()).and_then(|looked| looked.detection.failure.clone()) {
-            image.detection.failure = Some(named);
+    // A board of another size is of this kind.
+    let is_of_kind = |image: &SeriesImage| [Outline::OtherSize, Outline::Beyond].contains(&image.detection.outline);
+    let in_doubt = images.iter().zip(&*found).filter(|(_, image)| image.size.is_some() && !is_of_kind(image));
+    let in_doubt = in_doubt.filter_map(|(path, image)| Some((path.as_path(), image.detection.failure.as_ref()?)));
+    let failures: Vec<(&Path, &Error)> = in_doubt.collect();
+    let some: Vec<(&Path, &Error)> = spread(failures.len(), MOST_LOOKED_AT).map(|k| failures[k]).collect();
+    let bytes: Vec<u64> = some.iter().map(|(path, _)| bytes_of(path)).collect();
+    let look = |(path, why): &(&Path, &Error)| Some((*path, other_kind::named(&picture(path).ok()?, plate, why)?));
+    let mut all = batches(&bytes, MOST_IN_FLIGHT).into_iter();
+    let Some((shows, named)) = all.find_map(|batch| some[batch].par_iter().find_map_first(look)) else { return };
+    let name = shows.file_name().unwrap_or_default().to_string_lossy();
+    let what = if failures.len() == 1 { named.what.clone() } else { format!("in {name} {}", named.what) };
+    for image in found.iter_mut().filter(|image| image.size.is_some() && !is_of_kind(image)) {
+        if let Some(failure) = image.detection.failure.as_mut().filter(|failure| failure.code == named.code) {
+            *failure = Error { place: failure.place.clone(), what: what.clone(), ..named.clone() };
         }
     }
 }
 
 /// Looks at images, as many at a time as memory holds; in their order.
 fn in_batches<P: AsRef<Path> + Sync>(images: &[P], look: impl Fn(&Path) -> SeriesImage + Sync) -> Vec<SeriesImage> {
-    let bytes = |path: &P| picture_size(path.as_ref()).map_or(0, |(w, h)| BYTES_PER_PX * u64::from(w) * u64::from(h));
-    let sizes: Vec<u64> = images.iter().map(bytes).collect();
+    let sizes: Vec<u64> = images.iter().map(|path| bytes_of(path.as_ref())).collect();
     let mut found = Vec::with_capacity(images.len());
     for batch in batches(&sizes, MOST_IN_FLIGHT) {
         found.par_extend(images[batch].par_iter().map(|path| look(path.as_ref())));
     }
     found
+}
+
+/// Memory of a picture.
+fn bytes_of(path: &Path) -> u64 {
+    picture_size(path).map_or(0, |(w, h)| BYTES_PER_PX * u64::from(w) * u64::from(h))
 }
 
 /// The dots that are larger tell how a grid is turned: images that show others than most have ids that nobody can trust.
