@@ -176,6 +176,24 @@ fn a_folder_of_one_recording_is_a_recording_without_metadata_too() {
     assert!(!is_recording(&bag));
     assert_says(&read(&bag).unwrap_err(), Code::SeriesMissing, &["bag_0.mcap"]);
     fs::remove_file(bag.join("run2.mcap")).unwrap();
+    // So are those whose numbers do not follow each other: dates.
+    for (other, is_part) in [("bag_1.mcap", true), ("bag_2.mcap", false), ("bag_20240116.mcap", false)] {
+        fs::copy(bag.join("bag_0.mcap"), bag.join(other)).unwrap();
+        assert_eq!(is_recording(&bag), is_part, "{other}");
+        fs::remove_file(bag.join(other)).unwrap();
+    }
+    let days = folder.path().join("days");
+    fs::create_dir(&days).unwrap();
+    for day in ["rec_20240115.mcap", "rec_20240116.mcap"] {
+        fs::copy(bag.join("bag_0.mcap"), days.join(day)).unwrap();
+    }
+    assert!(!is_recording(&days));
+    // A recording with a manifest of its own is not read with that of the folder above.
+    let own = bag.join("bag_0.toml");
+    fs::write(&own, MANIFEST).unwrap();
+    assert!(!is_recording(&bag));
+    assert_says(&read(&bag).unwrap_err(), Code::SeriesMissing, &["bag_0.mcap"]);
+    fs::remove_file(own).unwrap();
     // What holds a series beside a recording stays a series.
     for name in ["series.toml", "joints.csv", "images"] {
         assert!(is_recording(&bag));

@@ -18,7 +18,8 @@ const SINGLE: [&str; 4] = ["mcap", "bag", "db3", "zstd"];
 const OF_SERIES: [&str; 5] = ["series.toml", "joints.csv", "controller.csv", "observations.csv", "images"];
 
 /// Whether a path is a recording: an `.mcap` file, another bag that will be refused with advice, or a rosbag2 folder. One without metadata.yaml,
-/// as a recorder leaves it that crashed, holds the files of one recording.
+/// as a recorder leaves it that crashed, holds the files of one recording, numbered from 0, without
+/// a manifest that is theirs alone.
 pub fn is_recording(path: &Path) -> bool {
     if !path.is_dir() {
         return path.extension().is_some_and(|e| SINGLE.iter().any(|known| e == *known));
@@ -27,9 +28,21 @@ pub fn is_recording(path: &Path) -> bool {
     if path.join("metadata.yaml").exists() {
         return !path.join("series.toml").exists();
     }
-    let mut names: Vec<String> = written_in(path).iter().map(|part| name_without_number(part)).collect();
-    names.dedup();
-    names.len() == 1 && !OF_SERIES.iter().any(has)
+    let parts = written_in(path);
+    // A recording with a manifest of its own is given by itself.
+    are_of_one(&parts)
+        && !parts.iter().any(|part| unpacked(part).with_extension("toml").is_file())
+        && !OF_SERIES.iter().any(has)
+}
+
+/// Whether there is one file, or several of one name that are numbered from 0, as rosbag2 does: other numbers may be dates.
+fn are_of_one(parts: &[PathBuf]) -> bool {
+    let mut numbered: Vec<(String, Option<u64>)> = parts.iter().map(|part| name_and_number(part)).collect();
+    numbered.sort();
+    numbered.dedup();
+    let is_next =
+        |((name, number), wanted): (&(String, Option<u64>), u64)| *name == numbered[0].0 && *number == Some(wanted);
+    numbered.len() == 1 || !numbered.is_empty() && numbered.iter().zip(0..).all(is_next)
 }
 
 /// Files of recordings in a folder, packed ones as well, in the order of their names.
@@ -152,13 +165,18 @@ fn split_number(path: &Path) -> (Option<u64>, PathBuf) {
     (number, path.to_path_buf())
 }
 
-/// The name of the recording that a file is a part of.
-fn name_without_number(path: &Path) -> String {
-    let stem = if ends(path, PACKED) { stem(&path.with_extension("")) } else { stem(path) };
-    match stem.rsplit_once('_') {
-        Some((name, number)) if number.parse::<u64>().is_ok() => name.to_owned(),
-        _ => stem,
+/// The name of the recording that a file is a part of, and which.
+fn name_and_number(path: &Path) -> (String, Option<u64>) {
+    let stem = stem(&unpacked(path));
+    match stem.rsplit_once('_').and_then(|(name, number)| Some((name.to_owned(), number.parse().ok()?))) {
+        Some((name, number)) => (name, Some(number)),
+        None => (stem, None),
     }
+}
+
+/// The file without the ending of a packed one.
+fn unpacked(path: &Path) -> PathBuf {
+    if ends(path, PACKED) { path.with_extension("") } else { path.to_path_buf() }
 }
 
 fn stem(path: &Path) -> String {
