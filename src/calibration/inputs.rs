@@ -1,5 +1,6 @@
 //! From files to identified observations.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::cell::{CellFiles, Ends};
@@ -114,9 +115,9 @@ impl Inputs {
         let Self { description, chain, series: all, tip_notice, mut files, pictures: _until_the_end } = self;
         let mut notices = description.notices.clone();
         notices.extend(tip_notice);
-        for s in &all {
-            files.extend(s.inputs.iter().cloned());
-            files.extend(s.image_hashes()?);
+        let hashes = all.iter().map(Series::image_hashes).collect::<Result<Vec<_>>>()?;
+        for (s, hashes) in all.iter().zip(&hashes) {
+            files.extend(s.inputs.iter().chain(hashes).cloned());
         }
         let mut series = Vec::with_capacity(all.len());
         let several = all.len() > 1;
@@ -133,7 +134,7 @@ impl Inputs {
                 series.push(measured.series);
             }
         }
-        all.iter().try_for_each(|s| require_unchanged(&files, &s.image_hashes()?))?;
+        all.iter().zip(&hashes).try_for_each(|(s, before)| require_unchanged(before, &s.image_hashes()?))?;
         Ok(Observed { description, chain, series, notices, files })
     }
 }
@@ -164,16 +165,25 @@ impl Observed {
     }
 }
 
-/// The hashes in a result are those of what was looked at: a file must be the same before and after.
+/// The hashes in a result are those of what was looked at: the images of a series must be the same before and after, none more and none less.
 ///
 /// # Errors
-/// A file that changed.
+/// A file that changed, vanished or appeared.
 pub fn require_unchanged(before: &[InputFile], after: &[InputFile]) -> Result<()> {
-    let is_changed = |a: &&InputFile| before.iter().any(|b| b.path == a.path && b.sha256 != a.sha256);
-    after.iter().find(is_changed).map_or(Ok(()), |changed| {
-        let remedy = "wait until nothing writes to the series any more, then run again";
-        Err(Error::new(Code::SeriesChanged, changed.path.display(), "changed while it was looked at", remedy))
-    })
+    let (old, new) = (by_path(before), by_path(after));
+    let is_other = |path: &&&Path| old.get(**path) != new.get(**path);
+    let Some(path) = old.keys().chain(new.keys()).find(is_other) else { return Ok(()) };
+    let what = match (old.contains_key(path), new.contains_key(path)) {
+        (true, true) => "changed while it was looked at",
+        (true, false) => "could be read no more after it had been looked at",
+        _ => "could be read only after the series had been looked at",
+    };
+    let remedy = "wait until nothing writes to the series any more, then run again";
+    Err(Error::new(Code::SeriesChanged, path.display(), what, remedy))
+}
+
+fn by_path(files: &[InputFile]) -> BTreeMap<&Path, &str> {
+    files.iter().map(|file| (file.path.as_path(), file.sha256.as_str())).collect()
 }
 
 fn read_all(folders: &[PathBuf]) -> Result<Vec<Series>> {
@@ -229,5 +239,22 @@ fn agreed<'a>(
             format!("{what} = \"{other}\", while {} has {what} = \"{link}\"", first.name),
             format!("series of one robot share base and tip: correct one, or give --{what}"),
         )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_that_changes_vanishes_or_appears_is_named() {
+        let file = |path: &str, sha256: &str| InputFile { path: path.into(), sha256: sha256.into() };
+        let [a, b, changed] = [file("a.png", "1"), file("b.png", "2"), file("b.png", "3")];
+        let both = [a.clone(), b];
+        assert!(require_unchanged(&both, &both).is_ok());
+        for (before, after) in [(&both[..], &both[..1]), (&both[..1], &both[..]), (&both[..], &[a, changed][..])] {
+            let error = require_unchanged(before, after).unwrap_err();
+            assert_eq!((error.code, error.place.as_str()), (Code::SeriesChanged, "b.png"));
+        }
     }
 }

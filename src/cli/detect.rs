@@ -102,12 +102,12 @@ fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<L
     let Some(series) = all.pop() else {
         return Err(Error::new(Code::OptionMissing, "detect", "the series was lost", "report this"));
     };
-    let mut inputs = series.inputs.clone();
-    inputs.extend(series.image_hashes()?);
+    let hashes = series.image_hashes()?;
+    let inputs = [series.inputs.as_slice(), &hashes].concat();
     let bar = progress::bar(series.stops.stops.len(), &series.name);
     let SeenSeries { images, flat_field } = detect_stops(&series, |_| bar.inc(1))?;
     bar.finish_and_clear();
-    require_unchanged(&inputs, &series.image_hashes()?)?;
+    require_unchanged(&hashes, &series.image_hashes()?)?;
     let mut notices = series.notices.clone();
     notices.extend(flat_field.iter().flat_map(|f| flat_field_drift(&series, &f.facts, &Limits::default())));
     Ok(Looked { plate: series.plate.clone(), images, notices, inputs, flat_field, series: Some(series) })
@@ -116,11 +116,12 @@ fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<L
 fn of_images(images: &[PathBuf], plate: &Path) -> Result<Looked> {
     let Series { plate, mut inputs, .. } = series_of_images(images, plate)?;
     let hashes = || images.iter().filter(|i| i.is_file()).map(|i| InputFile::of_file(i)).collect::<Result<Vec<_>>>();
-    inputs.extend(hashes()?);
+    let before = hashes()?;
+    inputs.extend(before.iter().cloned());
     let bar = progress::bar(images.len(), "images");
     let seen = crate::identify::detect_images(images, &plate, |_| bar.inc(1));
     bar.finish_and_clear();
-    require_unchanged(&inputs, &hashes()?)?;
+    require_unchanged(&before, &hashes()?)?;
     Ok(Looked { series: None, plate, images: seen, notices: Vec::new(), inputs, flat_field: None })
 }
 

@@ -63,9 +63,9 @@ pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
     };
     let series = pictures.of_recordings(series, &args.recording.options(&[])?)?;
     let (mut inputs, mut notices): (Vec<InputFile>, Vec<Notice>) = Default::default();
-    for s in &series {
-        inputs.extend(s.inputs.iter().cloned());
-        inputs.extend(s.image_hashes()?);
+    let hashes = series.iter().map(Series::image_hashes).collect::<Result<Vec<_>>>()?;
+    for (s, hashes) in series.iter().zip(&hashes) {
+        inputs.extend(s.inputs.iter().chain(hashes).cloned());
         if let Source::Cameras(_) = &s.source {
             notices.extend(s.notices.iter().cloned());
         }
@@ -73,7 +73,7 @@ pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
     let views: Vec<Series> = series.iter().flat_map(Series::views).cloned().map(without_joints).collect();
     let (mut measured, seen) = observe(&views)?;
     notices.extend(seen);
-    series.iter().try_for_each(|s| require_unchanged(&inputs, &s.image_hashes()?))?;
+    series.iter().zip(&hashes).try_for_each(|(s, before)| require_unchanged(before, &s.image_hashes()?))?;
     notices.extend(args.cameras.apply(&mut measured)?);
     let limits = Limits::default();
     let found = stand_alone(&measured, &limits)?;
