@@ -10,6 +10,7 @@ use super::paragraph::paragraph;
 use super::say::say_line;
 use crate::assess::Limits;
 use crate::calibration::{Ends, Inputs};
+use crate::detect::load;
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{is_whole, picture_size};
 use crate::identify::readings_of;
@@ -155,17 +156,11 @@ fn examine(series: &Series, args: &DoctorArgs, seen: &mut Examination) {
 /// All pictures can be opened, and have one size.
 fn images(series: &Series, seen: &mut Examination) {
     let paths: Vec<&PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.as_ref()).collect();
-    let sizes: Vec<Result<((u32, u32), bool)>> =
-        paths.par_iter().map(|p| Ok((picture_size(p)?, is_whole(p)?))).collect();
+    let sizes: Vec<Result<(u32, u32)>> = paths.par_iter().map(|path| size_of(path)).collect();
     let mut known: Vec<(u32, u32)> = Vec::new();
-    for (path, size) in paths.iter().zip(sizes) {
+    for size in sizes {
         match size {
-            Ok((size, true)) => known.push(size),
-            Ok((_, false)) => {
-                let what = "the file ends before its image does";
-                let remedy = "copy or record the image again";
-                seen.note(&Notice::new(Code::ImageTruncated, path.display(), what, remedy));
-            }
+            Ok(size) => known.push(size),
             Err(e) => seen.note(&Notice::new(e.code, e.place, format!("{}; the image is left out", e.what), e.remedy)),
         }
     }
@@ -184,6 +179,15 @@ fn images(series: &Series, seen: &mut Examination) {
         let what = format!("{others} images have another size than {width} x {height} px");
         seen.note(&Notice::new(Code::ImageSizeDiffers, "images", what, "they are left out"));
     }
+}
+
+/// Of a picture that can be used: one without a mark of its end may have all of its rows, and is decoded.
+fn size_of(path: &Path) -> Result<(u32, u32)> {
+    let size = picture_size(path)?;
+    if !is_whole(path)? {
+        load(path, None)?;
+    }
+    Ok(size)
 }
 
 fn stops(series: &Series, seen: &mut Examination) {
