@@ -48,7 +48,7 @@ impl Examination {
     }
 
     fn note(&self, notice: &Notice) {
-        paragraph("note      ", &notice.to_string(), MOST_LINES).iter().for_each(|line| say_line!("{line}"));
+        paragraph("note      ", &notice.coded(), MOST_LINES).iter().for_each(|line| say_line!("{line}"));
     }
 }
 

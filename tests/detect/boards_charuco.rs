@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::boards_scene::{Print, Scene, View};
 use crate::said::assert_says;
+use calib_targets_aruco::Dictionary;
 use calib_targets_aruco::builtins::{
     DICT_4X4_50, DICT_5X5_50, DICT_APRILTAG_16h5, DICT_APRILTAG_25h9, DICT_APRILTAG_36h10,
 };
@@ -77,17 +78,35 @@ fn part_of_a_charuco_board_keeps_its_ids() {
     assert!(error < 0.006, "{error}");
 }
 
+/// The codes of a board whose first marker is not 0.
+fn from(dictionary: Dictionary, first_id: usize) -> Dictionary {
+    let (before, after) = dictionary.codes().split_at(first_id);
+    let (size, bits) = (dictionary.marker_size(), dictionary.max_correction_bits());
+    Dictionary::from_static_codes(dictionary.name(), size, bits, [after, before].concat().leak()).unwrap()
+}
+
+/// A board of 27 markers that begins at 40 needs 67, of the 50 that there are.
+#[test]
+fn a_dictionary_that_is_too_short_for_the_first_marker_is_refused() {
+    let aruco = Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy: false, first_id: 40 };
+    let plate = Plate { aruco: Some(aruco), ..charuco_plate(None) };
+    let error = detect(&charuco_scene(0.1).render(0), &plate).expect_err("too short");
+    assert_says(&error, Code::PlateNotDetectable, &["50", "67", "first_id"]);
+}
+
 /// Boards with an even number of rows of squares as OpenCV drew them before 4.6, and as others still do.
 #[test]
 fn a_board_of_the_layout_before_opencv_4_6_keeps_its_ids() {
     let part = View::new(COLUMNS, ROWS, [120.0, 100.0], 60.0, 0.1, [0.0, 0.0]);
     // An odd number of columns, and an even one, which takes other markers for each row.
-    for (columns, view, least) in [(8, None, 40), (7, None, 35), (8, Some(part), 15)] {
+    let shapes = [(8, None, 40), (7, None, 35), (8, Some(part), 15)];
+    for (first_id, (columns, view, least)) in [0, 13].into_iter().flat_map(|first| shapes.map(|shape| (first, shape))) {
         let whole = View::new(columns, ROWS, [321.3, 239.6], 46.0, 0.2, [0.015, -0.01]);
         let new = Scene::new(columns, ROWS, view.unwrap_or(whole));
-        let print = |legacy: bool| Print::Charuco { dictionary: DICT_4X4_50, ratio: 0.7, legacy };
+        let dictionary = from(DICT_4X4_50, first_id as usize);
+        let print = |legacy: bool| Print::Charuco { dictionary, ratio: 0.7, legacy };
         let pictures = [false, true].map(|legacy| Scene { print: print(legacy), ..new.clone() }.render(0));
-        let aruco = |legacy| Some(Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy, first_id: 0 });
+        let aruco = |legacy| Some(Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy, first_id });
         let plate = |aruco| Plate { aruco, ..Plate::lattice(PlateKind::Charuco, columns, ROWS, 0.01, 1e-4) };
         for legacy in [false, true] {
             let detection = detect(&pictures[usize::from(legacy)], &plate(aruco(legacy))).unwrap();
@@ -99,7 +118,7 @@ fn a_board_of_the_layout_before_opencv_4_6_keeps_its_ids() {
             let in_part = view.is_some() && other.code == Code::PlateLineHidden;
             assert!(in_part || other.code == Code::PlateNotDetectable, "{columns} {legacy}: {other}");
         }
-        if view.is_some() {
+        if view.is_some() || first_id > 0 {
             continue;
         }
         let guessed = detect(&pictures[1], &plate(None)).unwrap();
