@@ -48,17 +48,17 @@ impl RobotDescription {
         let moving = |joint: &&JointElement| joint.joint_type != JointType::Fixed;
         let moves_below = |top: &&str| {
             let below = self.below(top);
-            self.joints.iter().filter(moving).any(|j| below.contains(j.parent.as_str()))
+            self.joints.iter().filter(moving).any(|j| below.contains_key(j.parent.as_str()))
         };
         let above = self.fixed_ancestors(base).map(|j| j.parent.as_str());
         let top = std::iter::once(base).chain(above).find(moves_below).unwrap_or(base);
         let within = self.below(top);
-        let below = |link: &str| within.contains(link);
+        let below = |link: &str| within.contains_key(link);
         let parents: BTreeSet<&str> = self.joints.iter().map(|j| j.parent.as_str()).collect();
         let is_leaf = |link: &str| !parents.contains(link);
         let leaves: Vec<&str> = self.links().filter(|l| *l != base && *l != top && is_leaf(l) && below(l)).collect();
         let all = self.joints.iter().filter(moving).filter(|j| below(&j.parent)).count();
-        let before = |leaf: &str| self.joints_above(leaf).take_while(|j| below(&j.parent)).filter(moving).count();
+        let before = |leaf: &str| within.get(leaf).copied().unwrap_or(0);
         let rank = |leaf: &str| USUAL.iter().position(|name| is_called(leaf, name)).unwrap_or(USUAL.len());
         let behind_all: Vec<&str> = leaves.iter().copied().filter(|l| before(l) == all).collect();
         let best = behind_all.iter().map(|l| rank(l)).min();

@@ -170,7 +170,7 @@ impl RobotDescription {
                 }
                 current = &joint.parent;
             }
-            rooted.append(&mut way);
+            rooted.extend(way);
         }
         Ok(())
     }
@@ -190,18 +190,19 @@ impl RobotDescription {
         Some((current, pose))
     }
 
-    /// A link and all links below it.
-    pub(super) fn below<'a>(&'a self, top: &'a str) -> BTreeSet<&'a str> {
-        let mut children: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    /// A link and all links below it, with the number of moving joints between.
+    pub(super) fn below<'a>(&'a self, top: &'a str) -> BTreeMap<&'a str, usize> {
+        let mut children: BTreeMap<&str, Vec<&JointElement>> = BTreeMap::new();
         for joint in &self.joints {
-            children.entry(&joint.parent).or_default().push(&joint.child);
+            children.entry(&joint.parent).or_default().push(joint);
         }
-        let mut found = BTreeSet::from([top]);
-        let mut waiting = vec![top];
-        while let Some(link) = waiting.pop() {
-            for child in children.get(link).into_iter().flatten() {
-                found.insert(*child);
-                waiting.push(*child);
+        let mut found = BTreeMap::from([(top, 0)]);
+        let mut waiting = vec![(top, 0)];
+        while let Some((link, moving)) = waiting.pop() {
+            for joint in children.get(link).into_iter().flatten() {
+                let moving = moving + usize::from(joint.joint_type != JointType::Fixed);
+                found.insert(&joint.child, moving);
+                waiting.push((&joint.child, moving));
             }
         }
         found
