@@ -69,8 +69,9 @@ pub(super) fn fit_model(
         problem.noise.marker = vec![1.0; problem.plates.len()];
     }
     let (known, near) = known.map_or((None, None), |(start, near)| (Some(start), near));
+    let has_same_lenses = known.as_ref().is_none_or(|known| known.has_lenses_of(state));
     let left = match known {
-        Some(known) => match near.as_ref().filter(|_| !known.has_lenses_of(&start.state)) {
+        Some(known) => match near.as_ref().filter(|_| !has_same_lenses) {
             Some(near) => {
                 let (adjusted, left) = known.with_lenses_of(near, start, &options.limits)?;
                 start = adjusted;
@@ -98,7 +99,7 @@ pub(super) fn fit_model(
     start_bodies(&mut start, series, &options.limits)?;
     let (mut ended, before) = {
         let _stage = stage("joint fit");
-        fit(start, free, (&aside, near.as_ref()), options)
+        fit(start, free, (&aside, near.as_ref(), has_same_lenses), options)
     };
     name_wrong_pairs(ended.adjustment_mut(), free, options.limits.other_readings_explain);
     let context = CheckContext { series, free, on_robot, stated_noise: None, limits: &options.limits };
@@ -201,11 +202,12 @@ impl JointFit {
 
 /// The fit, and what was known of the joint noise before some of it was set to none.
 ///
-/// Images that were set `aside` before take part where the fit says that they belong. A fit with another robot model may be `near`.
+/// Images that were set `aside` before take part where the fit says that they belong. A fit with another robot model may be `near`, and not
+/// quite as near one with other lenses.
 fn fit(
     mut start: Adjustment,
     free: &FreePoses,
-    (aside, near): (&[usize], Option<&Adjustment>),
+    (aside, near, has_same_lenses): (&[usize], Option<&Adjustment>, bool),
     options: &Options,
 ) -> (Ended, Option<NoiseInformation>) {
     let exact = options.joint_noise == JointNoise::Known(0.0);
@@ -223,7 +225,8 @@ fn fit(
     let components =
         ComponentOptions { joint: options.joint_noise == JointNoise::Estimated, ..ComponentOptions::default() };
     let mut outcome = match near {
-        Some(_) => estimate_components_near(start, &components),
+        Some(_) if has_same_lenses => estimate_components_near(start, &components),
+        Some(_) => estimate_components(start, &components),
         None => estimate_components_from_above(start, &components),
     };
     for _ in 0..ROUNDS {

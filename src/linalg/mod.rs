@@ -297,6 +297,21 @@ mod tests {
         assert!((f.log_determinant() - m.determinant().ln()).abs() < 1e-6);
     }
 
+    /// Larger than the squares in which triangles are mirrored, and not a multiple of them.
+    #[test]
+    fn both_triangles_of_a_large_inverse_are_filled() {
+        for n in [31, 33, 70] {
+            let m = DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {
+                0 => 3.0 + i as f64,
+                apart => ((i + j) as f64).sin() * 0.5_f64.powi(apart as i32),
+            });
+            let mut lower = m.clone();
+            lower.fill_upper_triangle(f64::NAN, 1);
+            let inverse = SymmetricFactor::new(&lower).unwrap().inverse();
+            assert!((&inverse * &m - DMatrix::identity(n, n)).amax() < 1e-12, "{n}");
+        }
+    }
+
     #[test]
     fn an_indefinite_or_infinite_matrix_is_refused() {
         assert!(SymmetricFactor::new(&DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0])).is_err());

@@ -362,12 +362,6 @@ pub fn solve_near(adjustment: Adjustment, settings: &Settings) -> Outcome {
     minimise_near(adjustment, settings).outcome
 }
 
-/// As [`solve`], with the covariance; `None` where it did not converge, or has none.
-pub fn converged(adjustment: Adjustment, settings: &Settings) -> Option<Fit> {
-    let minimised = minimise(adjustment, settings);
-    (minimised.outcome.status == Status::Converged).then(|| minimised.fit().ok()).flatten()
-}
-
 /// An outcome with what proposed its steps.
 pub(super) struct Minimised {
     pub outcome: Outcome,

@@ -45,7 +45,7 @@ pub use fit::Fit;
 pub use frame::{Frame, PlateScale, Similarity, frames};
 pub use in_frame::{InFrame, in_frame, in_frame_by};
 pub use length_misfit::LengthMisfit;
-pub use levenberg::{Ended, NoFit, Outcome, Settings, Status, converged, solve, solve_near};
+pub use levenberg::{Ended, NoFit, Outcome, Settings, Status, solve, solve_near};
 pub use linear::{BodyPart, LinearImage, LinearProblem, LinearStop, Linearised};
 pub use linearised_adjustment::LinearisedAdjustment;
 pub use noise_information::{NoiseInformation, Spread, noise_information};

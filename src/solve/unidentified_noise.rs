@@ -47,7 +47,10 @@ pub fn without_unidentified_noise(outcome: Outcome, settings: &Settings) -> (End
     match (kept.is_empty(), unidentified.is_empty()) {
         (_, true) => (found, None),
         (true, _) => (at_none, Some(told)),
-        _ => (solved_without(found.adjustment(), &unidentified, settings).ended(), Some(told)),
+        _ => {
+            drop(at_none);
+            (solved_without(found.adjustment(), &unidentified, settings).ended(), Some(told))
+        }
     }
 }
 
