@@ -128,9 +128,12 @@ fn name_other_kind(
     let failures: Vec<(&Path, &Error)> = in_doubt.collect();
     let some: Vec<(&Path, &Error)> = spread(failures.len(), MOST_LOOKED_AT).map(|k| failures[k]).collect();
     let bytes: Vec<u64> = some.iter().map(|(path, _)| bytes_of(path)).collect();
-    let look = |(path, why): &(&Path, &Error)| Some((*path, other_kind::named(&picture(path).ok()?, plate, why)?));
+    let look = |k: usize| {
+        let (path, why) = some[k];
+        Some((path, other_kind::named(&picture(path).ok()?, plate, why)?))
+    };
     let mut all = batches(&bytes, MOST_IN_FLIGHT).into_iter();
-    let Some((shows, named)) = all.find_map(|batch| some[batch].par_iter().find_map_first(look)) else { return };
+    let Some((shows, named)) = all.find_map(|batch| batch.into_par_iter().find_map_first(look)) else { return };
     let name = shows.file_name().unwrap_or_default().to_string_lossy();
     let what = if failures.len() == 1 { named.what.clone() } else { format!("in {name} {}", named.what) };
     for image in found.iter_mut().filter(|image| image.size.is_some() && !is_of_kind(image)) {

@@ -282,3 +282,19 @@ fn a_line_more_than_printed_is_missing_from_large_boards() {
         assert_says(&error, Code::PlateContradicted, &["28 x 17", "columns", "rows"]);
     }
 }
+
+/// A plate of another kind is looked for in some of the images alone: that takes longer than the detection.
+#[test]
+fn few_images_are_looked_at_for_a_plate_of_another_kind() {
+    let paths: Vec<_> = (0..20).map(|k| std::path::PathBuf::from(format!("{k}.png"))).collect();
+    let empty = Picture { pixels: vec![80.0; 160 * 120], width: 160, height: 120, full_scale: 255.0 };
+    let looked_at = std::sync::atomic::AtomicUsize::new(0);
+    let picture = |_: &std::path::Path| {
+        looked_at.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        Ok(empty.clone())
+    };
+    let seen = detect_series(&paths, &plate(9, 6), picture, |_| {});
+    assert!(seen.iter().all(|i| i.detection.failure.as_ref().is_some_and(|f| f.code == Code::PlateNotFound)));
+    let again = looked_at.into_inner() - paths.len();
+    assert!((1..=10).contains(&again), "{again}");
+}
