@@ -52,14 +52,23 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Cont
     contradicted.chain(doubtful).filter_map(|(all, weight)| together(&all, fit, setting, weight)).collect()
 }
 
-/// Those of one series that are off by the same ratio, together.
+/// The unit in which a distance seems to be that is off by so much.
+fn unit_of(off: f64, limits: &Limits) -> Option<LengthUnit> {
+    let is_unit = |unit: &&LengthUnit| ((1.0 + off) * unit.metres - 1.0).abs() < limits.scale_of_unit;
+    LENGTH_UNITS.iter().find(is_unit).copied()
+}
+
+/// Those of one series that are off by the same ratio, or seem to be in one unit, together.
 fn alike(misfits: Vec<LengthMisfit>, fit: &Fit, limits: &Limits) -> Vec<Vec<LengthMisfit>> {
     let series = |m: &LengthMisfit| fit.problem.lengths[m.index].read.0;
     let mut groups: Vec<Vec<LengthMisfit>> = Vec::new();
     for own in misfits {
-        let same = |group: &&mut Vec<LengthMisfit>| {
-            group.iter().all(|m| series(m) == series(&own) && m.is_alike(&own, limits.plate_size_sigmas))
+        let unit = unit_of(own.relative(), limits);
+        let is_like = |m: &LengthMisfit| match unit {
+            Some(_) => unit_of(m.relative(), limits) == unit,
+            None => m.is_alike(&own, limits.plate_size_sigmas),
         };
+        let same = |group: &&mut Vec<LengthMisfit>| group.iter().all(|m| series(m) == series(&own) && is_like(m));
         match groups.iter_mut().find(same) {
             Some(group) => group.push(own),
             None => groups.push(vec![own]),
@@ -81,8 +90,7 @@ fn together(all: &[LengthMisfit], fit: &Fit, setting: &CheckContext, weight: Wei
     let off = all.iter().map(|m| information(m) * m.relative()).sum::<f64>() / whole;
     // They have the lengths of the robot in common: together they know them no better than the best of them.
     let sigma = all.iter().map(LengthMisfit::relative_sigma).fold(f64::INFINITY, f64::min);
-    let is_unit = |unit: &&LengthUnit| ((1.0 + off) * unit.metres - 1.0).abs() < setting.limits.scale_of_unit;
-    let unit = LENGTH_UNITS.iter().find(is_unit).copied();
+    let unit = unit_of(off, setting.limits);
     let distances = all.iter().map(distance).collect();
     Some(ContradictedDistances { series: series.name.clone(), distances, off, sigma, unit, weight })
 }
