@@ -93,6 +93,9 @@ pub const CHECKS: &[Check] = &[
     Check {
         explains: |own, other| match (own, other) {
             (Finding::ContradictedLengths(own), Finding::DoubtedSize(plate)) => own.explains(plate),
+            (Finding::ContradictedLengths(own), Finding::ContradictedDistances(other)) => {
+                own.instrument.is_none() && other.weight == Weight::Note
+            }
             _ => false,
         },
         ..check("length_standard", Stage::Fit(|a, b, s| found(length_standard::check(a, b, s))))

@@ -43,7 +43,8 @@ pub struct ContradictedDistances {
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<ContradictedDistances> {
     let (lengths, limits) = (&fit.problem.lengths, setting.limits);
-    let misfits = fit.adjustment.length_misfits(&fit.covariance);
+    let Ok(covariance) = fit.own_covariance() else { return Vec::new() };
+    let misfits = fit.adjustment.length_misfits(&covariance);
     let count = misfits.len();
     let (out, used): (Vec<_>, Vec<_>) = misfits.into_iter().partition(|m| lengths[m.index].left_out);
     let doubtful =

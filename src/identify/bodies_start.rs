@@ -11,7 +11,8 @@ use super::body_misfit::{FEWEST_POSES, usual_misfit};
 use super::body_mistakes::name_mistake;
 use super::places_exchanged::name_exchange;
 use super::points_start::{
-    DISAGREES, FEWEST_POINTS, HOLD, Placed, PointAt, TRIMMINGS, agreeing_in_part, distances, usual_distance,
+    DISAGREES, FEWEST_POINTS, HOLD, Placed, PointAt, TRIMMINGS, agreeing_in_part, distances, once, posture,
+    usual_distance,
 };
 use crate::assess::{Limits, median};
 use crate::error::{Code, Error, Result};
@@ -145,14 +146,19 @@ fn start_sockets(
     if held.len() < needed {
         return Err(too_few());
     }
-    let found = in_sockets(&held).ok_or_else(too_few)?;
+    let most_out = limits.share_of_images_left_out;
+    let found = in_sockets(&held, most_out).ok_or_else(too_few)?;
     name_mistake(adjustment, &all, limits, |robot, seen| {
         let held: Vec<(usize, Pose)> = seen.iter().map(|s| (s.instrument, robot.base_from_tip(&s.readings))).collect();
-        in_sockets(&held).and_then(|found| median(&found.misfits(&held))).unwrap_or(f64::INFINITY)
+        let held = of_postures(&held);
+        in_sockets(&held, most_out).and_then(|found| median(&found.misfits(&held))).unwrap_or(f64::INFINITY)
     })?;
     // What sat in another socket than is said would spoil the noise of all before it is left out by its residual.
     let bound = f64::max(limits.suspicious_misfit, DISAGREES * median(&found.misfits(&held)).unwrap_or(0.0));
-    for (k, misfit) in all.into_iter().zip(found.misfits(&held)).filter(|(_, misfit)| *misfit > bound) {
+    let far = all.into_iter().zip(found.misfits(&held)).filter(|(_, misfit)| *misfit > bound);
+    let far: Vec<(usize, f64)> = far.collect();
+    let is_a_part = far.len() as f64 <= most_out * held.len() as f64;
+    for (k, misfit) in far.into_iter().filter(|_| is_a_part) {
         let measured = &mut adjustment.problem.body_measurements[k];
         measured.rejected = Some(BodyRejection::Residual { sigmas: misfit / measured.sigma_m });
     }
@@ -193,15 +199,27 @@ impl InSockets {
     }
 }
 
-/// From the stops that agree: those of a wrong socket would spoil it for all.
-fn in_sockets(held: &[(usize, Pose)]) -> Option<InSockets> {
+/// One stop of every posture in every socket.
+fn of_postures(held: &[(usize, Pose)]) -> Vec<(usize, Pose)> {
+    once(held, |(socket, tip)| (*socket, posture(tip)))
+}
+
+/// From the stops that agree: those of a wrong socket would spoil it for all. Postures count once, and no more than this share of them is left out.
+fn in_sockets(held: &[(usize, Pose)], most_out: f64) -> Option<InSockets> {
+    let held = &of_postures(held);
+    let mut touches: BTreeMap<usize, usize> = BTreeMap::new();
+    held.iter().for_each(|(socket, _)| *touches.entry(*socket).or_default() += 1);
+    // A socket that was touched once is where that touch is.
+    let tells: Vec<bool> = held.iter().map(|(socket, _)| touches[socket] > 1).collect();
     let mut found = by_all(held)?;
     for _ in 0..TRIMMINGS {
         let misfits = found.with_usual_places(held).misfits(held);
-        let bound = DISAGREES * median(&misfits)?;
+        let told: Vec<f64> = misfits.iter().zip(&tells).filter(|(_, tells)| **tells).map(|(m, _)| *m).collect();
+        let Some(usual) = median(&told) else { break };
         let agreeing: Vec<(usize, Pose)> =
-            held.iter().zip(&misfits).filter(|(_, misfit)| **misfit <= bound).map(|(stop, _)| *stop).collect();
-        match by_all(&agreeing) {
+            held.iter().zip(&misfits).filter(|(_, misfit)| **misfit <= DISAGREES * usual).map(|(s, _)| *s).collect();
+        let is_most = agreeing.len() as f64 >= (1.0 - most_out) * held.len() as f64;
+        match by_all(&agreeing).filter(|_| is_most) {
             Some(better) if better.places.len() == found.places.len() => found = better,
             _ => break,
         }

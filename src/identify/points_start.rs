@@ -4,6 +4,8 @@
 //! `b` alone with the nearest rotation. Where some points disagree, again from the nearest half, then from all that agree; where these are no
 //! majority, from parts of the rows.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::geom::{Pose, project_to_so3};
@@ -39,6 +41,29 @@ pub(super) const TRIMMINGS: usize = 5;
 /// Times the median misfit beyond which a point disagrees.
 pub(super) const DISAGREES: f64 = 4.0;
 
+/// Parts of a metre and of a direction in which tips of one posture are alike.
+const ONE_POSTURE: [f64; 2] = [1e-3, 5e-3];
+
+/// The first of all with each key.
+pub(super) fn once<T: Copy, K: Ord>(all: &[T], key: impl Fn(&T) -> K) -> Vec<T> {
+    let mut known = BTreeSet::new();
+    all.iter().filter(|one| known.insert(key(one))).copied().collect()
+}
+
+/// What tips of one posture have in common: a posture to which a robot returns again and again tells a start no more than once.
+pub(super) fn posture(tip: &Pose) -> [i64; 9] {
+    let [length, direction] = ONE_POSTURE;
+    let mut parts = [0; 9];
+    parts[..3].copy_from_slice(&tip.xyz().map(|v| (v / length).round() as i64));
+    parts.iter_mut().skip(3).zip(tip.rotation.iter()).for_each(|(part, v)| *part = (v / direction).round() as i64);
+    parts
+}
+
+/// One point of every posture.
+pub(super) fn distinct(points: &[PointAt]) -> Vec<PointAt> {
+    once(points, |(_, tip)| posture(tip))
+}
+
 /// How far every point is from where the tip carries the body, m.
 pub(super) fn distances(points: &[PointAt], (frame, body): &Placed) -> Vec<f64> {
     points.iter().map(|(p, tip)| (frame.transform(p) - tip.transform(&body.translation)).norm()).collect()
@@ -51,13 +76,15 @@ pub(super) fn usual_distance(points: &[PointAt], placed: &Placed) -> f64 {
     all.get(all.len().saturating_sub(1) / 2).copied().unwrap_or(f64::INFINITY)
 }
 
-/// Frame and body that most of the points fit.
+/// Frame and body that most of the points fit, every posture counting once.
 pub(super) fn agreeing(points: &[PointAt]) -> Option<Placed> {
+    let points = &distinct(points);
     nearest(points).map(|placed| without_others(points, placed))
 }
 
 /// Frame and body that most of the points fit, or a part of them where most do not fit to `bound`, m.
 pub(super) fn agreeing_in_part(points: &[PointAt], bound: f64) -> Option<Placed> {
+    let points = &distinct(points);
     let all = agreeing(points)?;
     let n = points.len();
     if n < MANY_POINTS || usual_distance(points, &all) < bound {

@@ -7,7 +7,7 @@
 //! t = r / sqrt(1 - h' C h)   where it did (W. Baarda 1968)
 //! ```
 //!
-//! is a normal deviate where nothing is wrong. One of `n` passes `sqrt(b^2 + 2 ln n)` with a probability below `exp(-b^2 / 2)`.
+//! is a normal deviate where nothing is wrong; a distance that took part misses all else by `r / (1 - h' C h)` of its sigmas. One of `n` passes `sqrt(b^2 + 2 ln n)` with a probability below `exp(-b^2 / 2)`.
 
 use super::covariance::Covariance;
 use crate::problem::{Adjustment, MeasuredLength};
@@ -20,9 +20,9 @@ const LEFT: f64 = 1e-9;
 pub struct LengthMisfit {
     /// Its index in the problem.
     pub index: usize,
-    /// As fitted, m.
+    /// As all else has it, m.
     pub fitted_m: f64,
-    /// Measured less fitted, m.
+    /// Measured less that, m.
     pub off_m: f64,
     /// The difference in its standard deviations, `t`.
     pub deviate: f64,
@@ -59,7 +59,8 @@ impl Adjustment {
             let length = measured.linearise(&problem.layout, state)?;
             let told: f64 = length.pairs().map(|((a, x), (b, y))| x * y * covariance.reduced[(a, b)]).sum();
             let variance = if measured.left_out { 1.0 + told } else { 1.0 - told };
-            let off_m = length.residual * measured.sigma_m;
+            let residual = if measured.left_out { length.residual } else { length.residual / variance };
+            let off_m = residual * measured.sigma_m;
             let fitted_m = measured.distance_m - off_m;
             let deviate = length.residual / variance.sqrt();
             (variance > LEFT).then_some(LengthMisfit { index, fitted_m, off_m, deviate })

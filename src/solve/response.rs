@@ -43,6 +43,17 @@ pub struct Response {
 }
 
 impl Fit {
+    /// The covariance of its own system: what holds a robot near nominal is not in the covariance that is stated.
+    ///
+    /// # Errors
+    /// Information that is not positive definite.
+    pub fn own_covariance(&self) -> Result<Cow<'_, Covariance>, Singular> {
+        match self.problem.restraint.is_some() {
+            true => Ok(Cow::Owned(self.linear().covariance()?)),
+            false => Ok(Cow::Borrowed(&self.covariance)),
+        }
+    }
+
     /// Response to columns that `of_image` gives, whitened, one row an equation.
     ///
     /// # Errors
@@ -52,11 +63,7 @@ impl Fit {
         count: usize,
         of_image: impl Fn(&LinearImage<'a>, &Equations) -> DMatrix<f64> + Sync,
     ) -> Result<Response, Singular> {
-        let covariance = match self.problem.restraint.is_some() {
-            // What holds a robot near nominal is not in the covariance.
-            true => Cow::Owned(self.linear().covariance()?),
-            false => Cow::Borrowed(&self.covariance),
-        };
+        let covariance = self.own_covariance()?;
         Ok(self.linear().response(&covariance, count, of_image))
     }
 }

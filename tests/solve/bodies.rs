@@ -588,3 +588,26 @@ fn places_of_two_contacts_that_were_exchanged_are_named() {
     let said = identify(world.chain.clone(), &[world.series], &Options::default()).map(|_| ()).unwrap_err();
     assert_eq!(said.code, Code::PlaceContradicted, "{said}");
 }
+
+/// A posture to which the robot returns again and again tells a start no more than once.
+#[test]
+fn postures_that_are_taken_often_hide_neither_good_touches_nor_mistakes() {
+    let world = World::sockets(61, 6, 4, 5e-5, 2e-5);
+    let mut often = world.series.clone();
+    for k in (0..24).step_by(4) {
+        let again = often.bodies[k].clone();
+        often.bodies.extend((0..4).map(|_| again.clone()));
+    }
+    let solution = identify(world.chain.clone(), &[often], &Options { model: RobotModel::Rigid, ..Options::default() });
+    let measured = solution.unwrap().fit.problem.body_measurements.clone();
+    assert_eq!(measured.len(), 48);
+    assert!(measured.iter().all(|m| m.rejected.is_none()), "{measured:?}");
+
+    let points = World::new(62, Kind::Points, 40, (3e-5, 0.0), 2e-5);
+    let mut home = points.series.clone();
+    let again = home.bodies[0].clone();
+    home.bodies.extend((0..60).map(|_| again.clone()));
+    home.stops.iter_mut().filter_map(|stop| stop.readings.as_mut()).for_each(|q| q.swap(1, 2));
+    let said = identify(points.chain.clone(), &[home], &Options::default()).map(|_| ()).unwrap_err();
+    assert_eq!(said.code, Code::JointOrderWrong, "{said}");
+}

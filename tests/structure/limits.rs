@@ -89,6 +89,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/points_start.rs FEWEST_POINTS", "unknowns of a start"),
     ("identify/points_start.rs HOLD", "rounding"),
     ("identify/points_start.rs MANY_POINTS", "unknowns of a start"),
+    ("identify/points_start.rs ONE_POSTURE", "rounding"),
     ("identify/points_start.rs PARTS", "how many are tried"),
     ("identify/points_start.rs ROUNDS", "iterations"),
     ("identify/points_start.rs STANDING_M", "iterations"),
