@@ -38,10 +38,10 @@ pub(super) fn check(
         return refuse(Code::TouchesFew, what, "touch the same point again, with the tip turned another way");
     }
     if columns.work_is_free() {
-        let distinct = distinct(&places, limits.touches_on_a_line);
-        if distinct < limits.fewest_places {
+        let apart = count_apart(&places, limits.touches_on_a_line);
+        if apart < limits.fewest_places {
             let what = format!(
-                "known places are {distinct}, and a work object has six unknowns: it takes three that are not on a line"
+                "known places are {apart}, and a work object has six unknowns: it takes three that are not on a line"
             );
             return refuse(
                 Code::TouchesFew,
@@ -51,7 +51,7 @@ pub(super) fn check(
         }
         if extents[1] < limits.touches_on_a_line * extents[0] {
             let what = format!(
-                "the {distinct} known places lie on a line ({:.2} mm RMS beside it, {:.0} mm along it): the work object could turn about it",
+                "the {apart} known places lie on a line ({:.2} mm RMS beside it, {:.0} mm along it): the work object could turn about it",
                 1e3 * extents[1],
                 1e3 * extents[0]
             );
@@ -128,7 +128,7 @@ pub(super) fn extents_m(points: &[Vector3<f64>]) -> [f64; 3] {
 }
 
 /// How many of the points are apart by more than a share of their extent.
-fn distinct(points: &[Vector3<f64>], share: f64) -> usize {
+fn count_apart(points: &[Vector3<f64>], share: f64) -> usize {
     let near = share * extents_m(points)[0];
     let is_new = |k: usize| points[..k].iter().all(|p| (p - points[k]).norm() > near);
     (0..points.len()).filter(|&k| is_new(k)).count()

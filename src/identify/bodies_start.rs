@@ -11,15 +11,15 @@ use super::body_misfit::{FEWEST_POSES, usual_misfit};
 use super::body_mistakes::name_mistake;
 use super::places_exchanged::name_exchange;
 use super::points_start::{
-    DISAGREES, FEWEST_POINTS, HOLD, Placed, PointAt, TRIMMINGS, agreeing_in_part, distances, once, posture,
-    usual_distance,
+    DISAGREES, FEWEST_POINTS, HOLD, Placed, PointAt, TRIMMINGS, agreeing_in_part, distances, once, point_at, posture,
+    tip_at, usual_distance,
 };
 use crate::assess::{Limits, median};
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::init::{PosePair, solve_hand_eye};
 use crate::linalg::SymmetricFactor;
-use crate::problem::{Adjustment, BodyMeasurement, BodyRejection, BodySeen, InstrumentKind, MeasuredSeries, Problem};
+use crate::problem::{Adjustment, BodyRejection, BodySeen, InstrumentKind, MeasuredSeries, Problem};
 
 /// Fills in instruments and bodies.
 ///
@@ -59,7 +59,7 @@ fn leave_out_others(adjustment: &mut Adjustment, measured: &[usize], placed: &Pl
     let all = &adjustment.problem.body_measurements;
     let points = measured.iter().filter(|&&k| matches!(all[k].seen, BodySeen::Point(_)));
     let (rows, points): (Vec<usize>, Vec<PointAt>) =
-        points.filter_map(|&k| Some((k, (all[k].seen.position(), tip(adjustment, &all[k])?)))).unzip();
+        points.filter_map(|&k| Some((k, point_at(adjustment, &all[k])?))).unzip();
     let bound = f64::max(limits.suspicious_misfit, DISAGREES * usual_distance(&points, placed));
     let far = rows.into_iter().zip(distances(&points, placed)).filter(|(_, distance)| *distance > bound);
     let far: Vec<(usize, f64)> = far.collect();
@@ -70,12 +70,6 @@ fn leave_out_others(adjustment: &mut Adjustment, measured: &[usize], placed: &Pl
         let measured = &mut adjustment.problem.body_measurements[k];
         measured.rejected = Some(BodyRejection::Residual { sigmas: distance / measured.sigma_m });
     }
-}
-
-/// Pose of the tip at the stop of a measurement.
-fn tip(adjustment: &Adjustment, measured: &BodyMeasurement) -> Option<Pose> {
-    let posture = adjustment.problem.stops[measured.stop].posture.as_ref()?;
-    Some(adjustment.state.robot.base_from_tip(&posture.readings))
 }
 
 fn too_few(problem: &Problem, instrument: usize, found: usize, needed: usize) -> Error {
@@ -95,7 +89,7 @@ fn framed(adjustment: &Adjustment, instrument: usize, measured: &[usize], limits
     let problem = &adjustment.problem;
     let of = |k: &usize| {
         let measured = &problem.body_measurements[*k];
-        Some((measured.seen, tip(adjustment, measured)?))
+        Some((measured.seen, tip_at(adjustment, measured)?))
     };
     let seen: Vec<(BodySeen, Pose)> = measured.iter().filter_map(of).collect();
     let pairs: Vec<PosePair> = seen
@@ -137,7 +131,7 @@ fn start_sockets(
     let all = sockets.iter().flat_map(|(_, measured)| measured.iter().copied());
     let at_robot = |k: usize| {
         let measured = &adjustment.problem.body_measurements[k];
-        Some((k, (measured.instrument, tip(adjustment, measured)?)))
+        Some((k, (measured.instrument, tip_at(adjustment, measured)?)))
     };
     let (all, held): (Vec<usize>, Vec<(usize, Pose)>) = all.filter_map(at_robot).unzip();
     // Every stop gives three coordinates: a place and the body are told by three stops.

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::breaks::divided;
-use super::points_start::{FEWEST_POINTS, Placed, PointAt, distances, usual_distance};
+use super::parts::divided;
+use super::points_start::{FEWEST_POINTS, Placed, PointAt, distances, each_place, point_at, usual_distance};
 use crate::assess::Limits;
 use crate::error::{Code, Error, Quantity, Result};
 use crate::geom::{Pose, rigid_fit};
@@ -26,12 +26,8 @@ pub(super) fn name_break(
     (measured, placed): (&[usize], &Placed),
     limits: &Limits,
 ) -> Result<()> {
-    let Adjustment { problem, state } = adjustment;
-    let of = |&k: &usize| {
-        let measured = &problem.body_measurements[k];
-        let posture = problem.stops[measured.stop].posture.as_ref()?;
-        Some((k, (measured.seen.position(), state.robot.base_from_tip(&posture.readings))))
-    };
+    let problem = &adjustment.problem;
+    let of = |&k: &usize| Some((k, point_at(adjustment, &problem.body_measurements[k])?));
     let (rows, points): (Vec<usize>, Vec<PointAt>) = measured.iter().filter_map(of).unzip();
     let bound = limits.suspicious_misfit;
     let are_poses = rows.iter().any(|&k| matches!(problem.body_measurements[k].seen, BodySeen::Pose(_)));
@@ -74,21 +70,11 @@ fn moved(points: &[PointAt], placed: &Placed, limits: &Limits) -> Option<Moved> 
     }
     let carried: Vec<(Vector3<f64>, Vector3<f64>)> =
         points.iter().map(|(p, tip)| (*p, tip.transform(&body.translation))).collect();
-    let is_told = points.len() >= limits.hand_eye_images && distinct(points) >= limits.fewest_places;
+    let places = each_place(points.iter().map(|(place, _)| *place)).len();
+    let is_told = points.len() >= limits.hand_eye_images && places >= limits.fewest_places;
     let other_frame = rigid_fit(&carried).filter(|_| is_told)?;
     let (angle_rad, distance_m) = frame.distance(&other_frame);
     explains(&(other_frame, *body)).then_some(Moved { is_body: false, distance_m, angle_rad })
-}
-
-/// Number of places: those of contacts come again.
-fn distinct(points: &[PointAt]) -> usize {
-    let mut places: Vec<Vector3<f64>> = Vec::new();
-    for (place, _) in points {
-        if !places.contains(place) {
-            places.push(*place);
-        }
-    }
-    places.len()
 }
 
 impl Moved {

@@ -1,6 +1,6 @@
 //! How well what an instrument saw of a body fits the readings.
 
-use super::points_start::{PointAt, agreeing, distinct, usual_distance};
+use super::points_start::{PointAt, agreeing, once_a_posture, usual_distance};
 use crate::geom::Pose;
 use crate::init::{PosePair, solve_hand_eye};
 use crate::model::robot::Robot;
@@ -46,6 +46,6 @@ pub(super) fn usual_misfit(robot: &Robot, seen: &[SeenAt]) -> f64 {
     if pairs.len() >= FEWEST_POSES {
         return solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error);
     }
-    let points = distinct(&seen.iter().map(|s| s.seen.position()).zip(tips).collect::<Vec<PointAt>>());
+    let points = once_a_posture(&seen.iter().map(|s| s.seen.position()).zip(tips).collect::<Vec<PointAt>>());
     agreeing(&points).map_or(f64::INFINITY, |placed| usual_distance(&points, &placed))
 }

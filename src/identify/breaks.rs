@@ -6,14 +6,12 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use super::parts::{divided, ends_of_parts};
 use super::suspects::Suspects;
 use crate::diagnose::{BodyMoved, Finding, agreement, all_stand_still, stands_still};
 use crate::error::{Code, Error};
 use crate::init::{HandEye, PosePair, SeenStop, solve_hand_eye};
 use crate::problem::MeasuredSeries;
-
-/// Parts of a series at whose ends it is divided at first.
-pub(super) const PARTS: usize = 8;
 
 /// Why images of one mounting and placement that miss by `misfit` do not fit.
 pub(super) fn broken(suspects: &Suspects, misfit: f64, of: &str) -> Option<Error> {
@@ -25,7 +23,7 @@ pub(super) fn broken(suspects: &Suspects, misfit: f64, of: &str) -> Option<Error
         let best = (part.len() >= fewest).then(|| solve_hand_eye(&pairs[part])).and_then(|all| all.into_iter().next());
         best.filter(|start| start.median_error < bound).map(|start| start.solution)
     };
-    let divisions = (1..PARTS).map(|k| (k * n / PARTS).max(fewest).min(n.saturating_sub(fewest)));
+    let divisions = ends_of_parts(n).skip(1).map(|k| k.max(fewest).min(n.saturating_sub(fewest)));
     let parts = divisions.flat_map(|k| [(0..k, true), (k..n, false)]).filter_map(|(part, is_first)| {
         let solution = solved(part)?;
         let fits: Vec<bool> = pairs.iter().map(|pair| solution.misfit(pair) < left).collect();
@@ -54,13 +52,6 @@ fn not_read(Suspects { problem, robot, series, pairs, limits, .. }: &Suspects, m
     );
     let remedy = "see whether the joints were read at these stops: correct their readings, or leave their rows out; if they were, check joint_unit, order and signs of the joints, the rows of the images and the URDF";
     Some(Error::new(Code::JointReadingsWrong, place, what, remedy))
-}
-
-/// Where rows are divided best, those that fit before it where `is_first`, else behind it, with how many stand on the wrong side.
-pub(super) fn divided(fits: &[bool], is_first: bool) -> (usize, usize) {
-    let n = fits.len();
-    let missed = |at: usize| fits.iter().enumerate().filter(|(k, fits)| **fits != ((*k < at) == is_first)).count();
-    (0..=n).map(|at| (missed(at), at)).min().unwrap_or((n, n))
 }
 
 /// A part of a series that fits by itself.

@@ -31,6 +31,7 @@ mod misread;
 mod mistakes;
 mod near_nominal;
 mod options;
+mod parts;
 mod places_exchanged;
 mod points_start;
 mod pose_comparison;

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::points_start::{PointAt, agreeing, distances};
+use super::points_start::{PointAt, agreeing, distances, each_place, point_at};
 use super::touch_mistakes::in_metres;
 use crate::assess::{Limits, median};
 use crate::diagnose::{Finding, Mistake, MistakeKind, RowsOf};
@@ -21,14 +21,9 @@ struct Touched {
 
 impl Touched {
     fn of(points: Vec<PointAt>) -> Self {
-        let mut places: Vec<Vector3<f64>> = Vec::new();
-        let mut index = |(place, _): &PointAt| {
-            places.iter().position(|p| p == place).unwrap_or_else(|| {
-                places.push(*place);
-                places.len() - 1
-            })
-        };
-        let place_of = points.iter().map(&mut index).collect();
+        let places = each_place(points.iter().map(|(place, _)| *place));
+        let index = |(place, _): &PointAt| places.iter().position(|p| p == place).unwrap_or_default();
+        let place_of = points.iter().map(index).collect();
         Self { points, place_of, places }
     }
 
@@ -55,16 +50,9 @@ impl Touched {
 ///
 /// # Errors
 /// The two.
-pub(super) fn name_exchange(
-    Adjustment { problem, state }: &Adjustment,
-    measured: &[usize],
-    limits: &Limits,
-) -> Result<()> {
-    let of = |&k: &usize| {
-        let measured = &problem.body_measurements[k];
-        let posture = problem.stops[measured.stop].posture.as_ref()?;
-        Some((measured.seen.position(), state.robot.base_from_tip(&posture.readings)))
-    };
+pub(super) fn name_exchange(adjustment: &Adjustment, measured: &[usize], limits: &Limits) -> Result<()> {
+    let problem = &adjustment.problem;
+    let of = |&k: &usize| point_at(adjustment, &problem.body_measurements[k]);
     let Some(&first) = measured.first() else { return Ok(()) };
     let instrument = &problem.instruments[problem.body_measurements[first].instrument];
     if instrument.kind != InstrumentKind::Places {

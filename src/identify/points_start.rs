@@ -8,8 +8,10 @@ use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::parts::ends_of_parts;
 use crate::geom::{Pose, project_to_so3};
 use crate::linalg::SymmetricFactor;
+use crate::problem::{Adjustment, BodyMeasurement};
 
 /// A point in the frame of its instrument, and the pose of the tip.
 pub(super) type PointAt = (Vector3<f64>, Pose);
@@ -28,9 +30,6 @@ const STANDING_M: f64 = 1e-7;
 
 /// Points that nine unknowns need.
 pub(super) const FEWEST_POINTS: usize = 4;
-
-/// Parts of the rows at whose ends they are divided.
-const PARTS: usize = 8;
 
 /// Points of which half tell nine unknowns well.
 const MANY_POINTS: usize = 16;
@@ -60,8 +59,30 @@ pub(super) fn posture(tip: &Pose) -> [i64; 9] {
 }
 
 /// One point of every posture.
-pub(super) fn distinct(points: &[PointAt]) -> Vec<PointAt> {
+pub(super) fn once_a_posture(points: &[PointAt]) -> Vec<PointAt> {
     once(points, |(_, tip)| posture(tip))
+}
+
+/// Places each once, in the order in which they come: those of contacts come again, number by number.
+pub(super) fn each_place(places: impl IntoIterator<Item = Vector3<f64>>) -> Vec<Vector3<f64>> {
+    let mut all: Vec<Vector3<f64>> = Vec::new();
+    for place in places {
+        if !all.contains(&place) {
+            all.push(place);
+        }
+    }
+    all
+}
+
+/// Pose of the tip at the stop of a measurement, by the robot as it stands; `None` off the robot.
+pub(super) fn tip_at(Adjustment { problem, state }: &Adjustment, measured: &BodyMeasurement) -> Option<Pose> {
+    let posture = problem.stops[measured.stop].posture.as_ref()?;
+    Some(state.robot.base_from_tip(&posture.readings))
+}
+
+/// A measurement as a point; `None` off the robot.
+pub(super) fn point_at(adjustment: &Adjustment, measured: &BodyMeasurement) -> Option<PointAt> {
+    Some((measured.seen.position(), tip_at(adjustment, measured)?))
 }
 
 /// How far every point is from where the tip carries the body, m.
@@ -78,19 +99,19 @@ pub(super) fn usual_distance(points: &[PointAt], placed: &Placed) -> f64 {
 
 /// Frame and body that most of the points fit, every posture counting once.
 pub(super) fn agreeing(points: &[PointAt]) -> Option<Placed> {
-    let points = &distinct(points);
+    let points = &once_a_posture(points);
     nearest(points).map(|placed| without_others(points, placed))
 }
 
 /// Frame and body that most of the points fit, or a part of them where most do not fit to `bound`, m.
 pub(super) fn agreeing_in_part(points: &[PointAt], bound: f64) -> Option<Placed> {
-    let points = &distinct(points);
+    let points = &once_a_posture(points);
     let all = agreeing(points)?;
     let n = points.len();
     if n < MANY_POINTS || usual_distance(points, &all) < bound {
         return Some(all);
     }
-    let divisions = (1..PARTS).map(|k| k * n / PARTS).flat_map(|at| [&points[..at], &points[at..]]);
+    let divisions = ends_of_parts(n).skip(1).flat_map(|at| [&points[..at], &points[at..]]);
     let of_part = |part: &[PointAt]| Some(without_others(points, nearest(part)?));
     let of_parts = divisions.filter(|part| 2 * part.len() >= MANY_POINTS).filter_map(of_part);
     let best = |a: &Placed, b: &Placed| usual_distance(points, a).total_cmp(&usual_distance(points, b));

@@ -6,12 +6,11 @@
 use std::ops::Range;
 
 use super::bases;
-use super::breaks::PARTS;
 use super::mistakes::shifted_rows;
-use super::suspects::{ENOUGH, Suspects};
+use super::parts::ends_of_parts;
+use super::suspects::{Suspects, some_of};
 use crate::diagnose::{MistakeKind, ShiftedPart};
 use crate::init::{PosePair, SeenStop, solve_hand_eye};
-use crate::series::spread;
 
 impl Suspects<'_> {
     /// Shifts of a part of the rows by one, for either direction in which there is one, with the misfit that they leave.
@@ -43,13 +42,11 @@ impl Suspects<'_> {
         let other: Vec<PosePair> = self.pairs.iter().zip(shifted).map(of_neighbour).collect();
         let n = own.len();
         let divided = |(at, [first, last]): (usize, [&[PosePair]; 2])| {
-            let pairs: Vec<PosePair> = spread(n, ENOUGH).map(|k| if k < at { first[k] } else { last[k] }).collect();
+            let pairs: Vec<PosePair> = some_of(n).map(|k| if k < at { first[k] } else { last[k] }).collect();
             solve_hand_eye(&pairs).into_iter().next()
         };
-        let divisions = (0..PARTS).flat_map(|k| {
-            let at = k * n / PARTS;
-            [(at, [own.as_slice(), other.as_slice()]), (at, [other.as_slice(), own.as_slice()])]
-        });
+        let divisions = ends_of_parts(n)
+            .flat_map(|at| [(at, [own.as_slice(), other.as_slice()]), (at, [other.as_slice(), own.as_slice()])]);
         let solved = divisions.filter_map(divided).min_by(|a, b| a.median_error.total_cmp(&b.median_error))?;
         let most = self.limits.mistake_explains * misfit;
         let left =

@@ -26,8 +26,13 @@ pub(super) struct Suspects<'a> {
     pub limits: &'a Limits,
 }
 
-/// Images by which a mistake is seen to explain the misfit of all.
-pub(super) const ENOUGH: usize = 100;
+/// Images by which a mistake is seen to explain the misfit of all: a sample of a median.
+const ENOUGH: usize = 100;
+
+/// Those of `n` images by which a mistake is seen to explain the misfit of all.
+pub(super) fn some_of(n: usize) -> impl Iterator<Item = usize> {
+    spread(n, ENOUGH)
+}
 
 impl Suspects<'_> {
     /// The mistake that, undone, fits far better than `misfit`, if there is one, and the misfit that it then leaves.
@@ -114,7 +119,7 @@ impl Suspects<'_> {
         // Where bases were found from the readings as they are, they are found anew.
         let placed = bases::found(self.robot).and_then(|joint| bases::placed(self.robot, joint, &stops));
         let robot = placed.as_ref().unwrap_or(self.robot);
-        let pairs: Vec<PosePair> = spread(stops.len(), ENOUGH).map(|k| stops[k].pair(robot)).collect();
+        let pairs: Vec<PosePair> = some_of(stops.len()).map(|k| stops[k].pair(robot)).collect();
         solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error)
     }
 

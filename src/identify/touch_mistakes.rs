@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use super::misread::all_misread;
 use super::mistakes::mistakes_undone;
+use super::points_start::each_place;
 use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, MistakeKind, RowsOf};
 use crate::error::Code;
@@ -141,7 +142,7 @@ fn explained(
     let fewest = limits.fewest_touches;
     let from = fewest..(touches.postures.len() + 1).saturating_sub(fewest);
     let with_given = |(touches, what): (Touches, What)| Undone { touches, given: *given, what };
-    let places = distinct(touches.all.iter()).into_iter().map(|place| {
+    let places = known_places(touches.all.iter()).into_iter().map(|place| {
         let (other, _) = with_unknown_places(touches, |touch| touch.seen == Seen::Point(place));
         (other, What::Place(place))
     });
@@ -217,21 +218,17 @@ fn seen(seen: BodySeen) -> Seen {
 }
 
 /// Places of points that are known, each once.
-fn distinct<'a>(touches: impl Iterator<Item = &'a Touch>) -> Vec<Vector3<f64>> {
-    let mut all: Vec<Vector3<f64>> = Vec::new();
-    for touch in touches {
-        match touch.seen {
-            Seen::Point(place) if !all.contains(&place) => all.push(place),
-            _ => {}
-        }
-    }
-    all
+fn known_places<'a>(touches: impl Iterator<Item = &'a Touch>) -> Vec<Vector3<f64>> {
+    each_place(touches.filter_map(|touch| match touch.seen {
+        Seen::Point(place) => Some(place),
+        Seen::Pose(_) | Seen::Unknown(_) => None,
+    }))
 }
 
 /// The known places of some touches as unknown contacts, the last, and where they are said to be.
 fn with_unknown_places(touches: &Touches, of: impl Fn(&Touch) -> bool) -> (Touches, Vec<Vector3<f64>>) {
     let mut apart = touches.clone();
-    let known = distinct(touches.all.iter().filter(|t| of(t)));
+    let known = known_places(touches.all.iter().filter(|t| of(t)));
     for touch in apart.all.iter_mut().filter(|t| of(t)) {
         let Seen::Point(place) = touch.seen else { continue };
         let index = known.iter().position(|p| *p == place).unwrap_or_default();
