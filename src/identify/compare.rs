@@ -65,10 +65,18 @@ pub fn compare(
     let total = by_image.len() + by_region.len() + 1;
     let done = AtomicUsize::new(0);
     let tick = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
-    let against_truth = truth.map(|t| truth_errors(solution.joint_fit(), t)).transpose()?;
+    let solved = PoseStage::solved(joint);
+    let against = |truth: &Truth| match &some {
+        Cow::Borrowed(all) => truth_errors(all, solved.as_ref(), truth),
+        Cow::Owned(_) => {
+            let all = solution.joint_fit();
+            truth_errors(all, PoseStage::solved(all).as_ref(), truth)
+        }
+    };
+    let against_truth = truth.map(against).transpose()?;
     tick();
-    let image_errors = held_out(joint, &by_image, (&all, known), &tick);
-    let region_errors = held_out(joint, &by_region, (&all, &[]), &tick);
+    let image_errors = held_out(joint, solved.as_ref(), &by_image, (&all, known), &tick);
+    let region_errors = held_out(joint, solved.as_ref(), &by_region, (&all, &[]), &tick);
     let of_truth = |k: usize| against_truth.as_ref().and_then(|t| t[k]);
     let held = [Some(&image_errors), Some(&region_errors).filter(|e| !e.is_empty())];
     let rows = rows(&cluster_of_images(problem, limits), &all, held, of_truth);
@@ -91,7 +99,7 @@ pub fn beside_two_stages(solution: &Solution) -> Option<Comparison> {
         _ => true,
     };
     let taking_part: Vec<Estimator> = Estimator::ALL.into_iter().filter(takes_part).collect();
-    let errors = held_out(joint, &folds, (&taking_part, known), &|| ());
+    let errors = held_out(joint, PoseStage::solved(joint).as_ref(), &folds, (&taking_part, known), &|| ());
     let rows = rows(&cluster_of_images(problem, limits), &taking_part, [Some(&errors), None], |_| None);
     Some(Comparison { rows, images, folds: [folds.len(), 0] })
 }
@@ -138,18 +146,18 @@ fn fitted(
 /// Error of every held-out image, with its index, by every estimator; `None` where an estimator has no solution for a fold.
 type Errors = Vec<(usize, Vec<Option<ImageError>>)>;
 
-/// Errors by some estimators; those of the joint fit may be `known`.
+/// Errors by some estimators, from the stand-alone poses of all images where they are `solved`; those of the joint fit may be `known`.
 fn held_out(
     joint: &Adjustment,
+    solved: Option<&LinearisedAdjustment>,
     folds: &[Vec<usize>],
     (estimators, known): (&[Estimator], &[(usize, ImageError)]),
     tick: &(dyn Fn() + Sync),
 ) -> Errors {
-    let solved = PoseStage::solved(joint);
     let whole = if known.is_empty() { LinearisedAdjustment::of(joint.clone()) } else { None };
     let of_fold = |_: usize, fold: &Vec<usize>| -> Errors {
         let refit = || Some(refitted_near(whole.as_ref()?.linear().without_images(fold)));
-        let found = fitted(&joint.without_images(fold), solved.as_ref(), estimators, refit);
+        let found = fitted(&joint.without_images(fold), solved, estimators, refit);
         let alike = same_cameras(&found);
         let errors = fold.iter().map(|i| (*i, errors_of(joint, *i, (&found, &alike)))).collect();
         tick();
@@ -205,10 +213,14 @@ fn summary(errors: &Errors, clusters: &[usize], k: usize, joint: Option<usize>) 
     })
 }
 
-fn truth_errors(joint: &Adjustment, truth: &Truth) -> Result<Vec<Option<TruthError>>> {
+fn truth_errors(
+    joint: &Adjustment,
+    solved: Option<&LinearisedAdjustment>,
+    truth: &Truth,
+) -> Result<Vec<Option<TruthError>>> {
     let Some(whole) = LinearisedAdjustment::of(joint.clone()) else { return Ok(vec![None; Estimator::ALL.len()]) };
     let refit = || Some(refitted_near(whole.clone()));
-    let found = fitted(joint, PoseStage::solved(joint).as_ref(), &Estimator::ALL, refit);
+    let found = fitted(joint, solved, &Estimator::ALL, refit);
     found.iter().map(|s| s.as_ref().map(|s| truth_error(s, truth)).transpose().map(Option::flatten)).collect()
 }
 
