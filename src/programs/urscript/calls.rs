@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::routines::called;
-use super::{BLOCKS, MOVES, Script, Value};
+use super::routines::{Blocks, called};
+use super::{MOVES, Script, Value};
 use crate::programs::field::FieldPlace;
 use crate::programs::program::Left;
 use crate::programs::reason::{LeftReason, Why};
@@ -108,20 +108,16 @@ fn arguments(reader: &Reader<'_>, close: usize) -> Vec<usize> {
 impl Script<'_> {
     /// Routines of the text that hand what they are given on to one that is in none of the files.
     pub(super) fn find_routines_that_hand_on(&mut self) {
-        let mut open: Vec<Option<usize>> = Vec::new();
+        let mut blocks = Blocks::default();
         let mut routines: Vec<Routine> = Vec::new();
         while !self.reader.done() {
             let word = self.reader.word().unwrap_or_default();
-            if matches!(word, b"def" | b"thread") {
+            let is_statement = blocks.follow(word);
+            if blocks.routines > routines.len() {
                 self.reader.at += 1;
                 let name = called(&self.reader, 0).unwrap_or_default();
-                open.push(Some(routines.len()));
                 routines.push(Routine { name, parameters: self.parameters(), hands_on_to: Vec::new() });
-            } else if BLOCKS.contains(&word) {
-                open.push(None);
-            } else if word == b"end" {
-                open.pop();
-            } else if let Some(within) = open.iter().rev().copied().flatten().next()
+            } else if let Some(within) = blocks.routine().filter(|_| !is_statement)
                 && let Some((name, close)) = call(&self.reader)
             {
                 let arguments = arguments(&self.reader, close);

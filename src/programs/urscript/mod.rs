@@ -22,6 +22,7 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, exp_so3};
 use active::{Active, ToolIs};
+use routines::{BLOCKS, Blocks};
 
 const DIALECT: Dialect =
     Dialect { comment: b'#', quotes: b"\"'", header: None, based_numbers: false, latin_letters: false };
@@ -36,8 +37,6 @@ const MOVES: [(&[u8], usize, Way); 8] = [
     (b"optimovej", 1, Way::Joints),
     (b"optimovel", 1, Way::Line),
 ];
-/// Statements that end with `end`.
-const BLOCKS: [&[u8]; 6] = [b"def", b"thread", b"if", b"while", b"switch", b"for"];
 /// Decimals in rad and m.
 const DECIMALS: usize = 8;
 
@@ -148,18 +147,12 @@ impl Script<'_> {
     /// Looks through the whole text for variables with computed values, or with one of several: which of them holds is known only where the text
     /// is read from top to bottom.
     fn find_computed(&mut self) -> Result<()> {
-        let (mut given, mut routines, mut open) = (BTreeMap::<Vec<u8>, (usize, bool)>::new(), 0, Vec::new());
+        let (mut given, mut blocks) = (BTreeMap::<Vec<u8>, (usize, bool)>::new(), Blocks::default());
         while !self.reader.done() {
             let name = self.reader.word().map(<[u8]>::to_vec);
             self.reader.at += 1;
             let Some(name) = name else { continue };
-            let is_routine = matches!(&name[..], b"def" | b"thread");
-            routines += usize::from(is_routine);
-            if BLOCKS.contains(&&name[..]) {
-                open.push(is_routine);
-            } else if name == b"end" {
-                open.pop();
-            }
+            blocks.follow(&name);
             if name == b"def" {
                 self.computed.extend(self.parameters());
             }
@@ -178,12 +171,12 @@ impl Script<'_> {
                     Value::Expression => _ = self.computed.insert(name),
                     _ => {
                         let (times, nested) = given.entry(name).or_default();
-                        (*times, *nested) = (*times + 1, *nested || open.contains(&false));
+                        (*times, *nested) = (*times + 1, *nested || blocks.is_nested());
                     }
                 }
             }
         }
-        let several = given.into_iter().filter(|(_, (times, nested))| *times > 1 && (*nested || routines > 1));
+        let several = given.into_iter().filter(|(_, (times, nested))| *times > 1 && (*nested || blocks.routines > 1));
         self.computed.extend(several.map(|(name, _)| name));
         self.reader.at = 0;
         Ok(())
