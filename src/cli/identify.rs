@@ -9,11 +9,10 @@ use super::camera_args::CameraArgs;
 use super::choices::ChoiceArgs;
 use super::recording::RecordingArgs;
 use super::say::{say, say_line};
-use super::show::read_solution;
+use super::show::{read_solution, read_solution_with_bytes};
 use super::{Verdict, long_table, progress, stages, summary};
 use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
 use crate::error::{Code, Error, Result};
-use crate::files::{self, FileKind};
 use crate::identify::{Estimator, Options, dry_run};
 use crate::output::solution_json::{FILE_NAME, TIMINGS};
 use crate::output::{Offsets, Poses, ResultFolder, folder_name, restore};
@@ -177,9 +176,9 @@ fn write(
     }
     result.finish()?;
     // What is printed is what `show` prints: it comes from the file.
-    let record = read_solution(&folder)?;
+    let (record, bytes) = read_solution_with_bytes(&folder)?;
     match (args.json, stages::are_told()) {
-        (true, _) => say!("{}", files::read_text(&folder.join(FILE_NAME), FileKind::Solution)?),
+        (true, _) => say!("{}", String::from_utf8_lossy(&bytes)),
         (_, true) => say!("{}", long_table::text(&record)),
         _ => say!("{}", summary::text(&record, &folder)),
     }

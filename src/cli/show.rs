@@ -45,12 +45,20 @@ pub(super) struct ShowArgs {
 
 /// Reads a solution: the file, or that of a folder of results.
 pub(super) fn read_solution(path: &Path) -> Result<SolutionRecord> {
+    read_solution_with_bytes(path).map(|(record, _)| record)
+}
+
+/// As [`read_solution`], with the bytes of the file.
+pub(super) fn read_solution_with_bytes(path: &Path) -> Result<(SolutionRecord, Vec<u8>)> {
     let within = path.join(solution_json::FILE_NAME);
     let path = if path.is_dir() { &within } else { path };
     recover(path)?;
     let bytes = files::read(path, FileKind::Solution)?;
-    solution_json::read(&bytes)
-        .map_err(|e| Error { place: e.place.replacen(solution_json::FILE_NAME, &path.display().to_string(), 1), ..e })
+    let record = solution_json::read(&bytes).map_err(|e| Error {
+        place: e.place.replacen(solution_json::FILE_NAME, &path.display().to_string(), 1),
+        ..e
+    })?;
+    Ok((record, bytes))
 }
 
 pub(super) fn run(args: &ShowArgs) -> Result<Verdict> {
