@@ -17,11 +17,15 @@ const ENDS: f64 = 0.12;
 /// Corners of a quadrilateral, clockwise on the screen.
 pub(super) type Quad = [[f64; 2]; 4];
 
-/// The dark quadrilaterals of a picture that are at most `largest_px` across. `threshold` lies between paper (0) and ink (1).
-pub(super) fn quads(picture: &Picture, largest_px: f64, threshold: f32) -> Vec<Quad> {
-    let negative = Picture { pixels: picture.pixels.iter().map(|v| -v).collect(), ..*picture };
-    let levels = Levels::of(&negative, largest_px, threshold);
-    let found = contours(&negative, &levels, (4.0 * SHORTEST_PX) as usize, (6.0 * largest_px) as usize);
+/// A picture in which what was dark is bright, of levels below zero.
+pub(super) fn inverted(picture: &Picture) -> Picture {
+    Picture { pixels: picture.pixels.iter().map(|v| -v).collect(), ..*picture }
+}
+
+/// The dark quadrilaterals of a picture, which is given `inverted`, that are at most `largest_px` across. `threshold` lies between paper (0) and ink (1).
+pub(super) fn quads(inverted: &Picture, largest_px: f64, threshold: f32) -> Vec<Quad> {
+    let levels = Levels::of(inverted, largest_px, threshold);
+    let found = contours(inverted, &levels, (4.0 * SHORTEST_PX) as usize, (6.0 * largest_px) as usize);
     found.iter().filter(|c| c.encloses == Encloses::Light && !c.clipped && !c.too_long).filter_map(quad).collect()
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use calib_targets_aruco::{Dictionary, builtins};
 
 use super::Picture;
-use super::quads::{Quad, quads};
+use super::quads::{Quad, inverted, quads};
 use super::tag_code::{Reader, Reading};
 use super::tag_layout::{Layout, Tagged};
 
@@ -31,7 +31,8 @@ pub(super) fn all_dictionaries() -> impl Iterator<Item = Dictionary> {
 /// Dark quadrilaterals, pass by pass.
 pub(super) fn passes(picture: &Picture) -> impl Iterator<Item = Vec<Quad>> {
     let longer = picture.width.max(picture.height) as f64;
-    PASSES.into_iter().map(move |(share, threshold)| quads(picture, share * longer, threshold))
+    let inverted = inverted(picture);
+    PASSES.into_iter().map(move |(share, threshold)| quads(&inverted, share * longer, threshold))
 }
 
 /// Adds what the quadrilaterals of a pass say; of two that say the same none is known to be right.
