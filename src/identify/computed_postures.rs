@@ -54,8 +54,23 @@ pub(super) struct Compared {
 }
 
 impl Compared {
-    /// `hold` holds the columns that are not to be fitted.
-    pub fn of(
+    /// What is `found` with series of which some have readings that were computed from poses; `None` where all were read. `hold` holds the columns
+    /// that are not to be fitted.
+    pub fn with<T>(
+        stage_name: &'static str,
+        robot: &Robot,
+        (series, limits): (&[MeasuredSeries], &Limits),
+        hold: impl FnOnce(&mut Adjustment) -> Result<()>,
+        found: impl FnOnce(&Self) -> Option<T>,
+    ) -> Option<T> {
+        if !series.iter().any(MeasuredSeries::readings_are_computed) {
+            return None;
+        }
+        let _stage = stage(stage_name);
+        found(&Self::of(robot, series, limits, hold)?)
+    }
+
+    fn of(
         robot: &Robot,
         series: &[MeasuredSeries],
         limits: &Limits,
@@ -153,14 +168,12 @@ pub(super) fn told_by_images<'a>(
     limits: &Limits,
     hold: impl FnOnce(&mut Adjustment) -> Result<()>,
 ) -> (Cow<'a, [MeasuredSeries]>, Option<Told>) {
-    let unchanged = (Cow::Borrowed(series), None);
-    if !series.iter().any(MeasuredSeries::readings_are_computed) {
-        return unchanged;
-    }
-    let _stage = stage("postures");
-    let compared = Compared::of(robot, series, limits, hold);
-    let Some(stops) = compared.and_then(|compared| Stops::of(&compared, series)) else { return unchanged };
-    let Some((chosen, is_open)) = stops.chosen(from, limits) else { return unchanged };
+    let found = Compared::with("postures", robot, (series, limits), hold, |compared| {
+        let stops = Stops::of(compared, series)?;
+        let chosen = stops.chosen(from, limits)?;
+        Some((stops, chosen))
+    });
+    let Some((stops, (chosen, is_open))) = found else { return (Cow::Borrowed(series), None) };
     let mut told = series.to_vec();
     let mut changed = 0;
     for (stop, &c) in stops.all.iter().zip(&chosen.postures).filter(|(_, c)| **c > 0) {

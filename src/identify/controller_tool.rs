@@ -22,7 +22,6 @@ use crate::model::inverse::{reading_limits, solve_from};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries, State};
 use crate::series::{CameraMount, spread};
-use crate::stage::stage;
 
 /// Stops that are compared, at most.
 const MOST_STOPS: usize = 100;
@@ -44,15 +43,12 @@ pub(super) fn tool_in_poses(
     limits: &Limits,
     hold: impl FnOnce(&mut Adjustment) -> Result<()>,
 ) -> Option<ToolInPoses> {
-    if !series.iter().any(MeasuredSeries::readings_are_computed) {
-        return None;
-    }
-    let _stage = stage("tool in poses");
-    let compared = Compared::of(robot, series, limits, hold)?;
-    let searches = [PosesOf::Tool, PosesOf::Frame].map(|of| Search::new(&compared, series, robot, of));
-    let found: Vec<(PosesOf, Tried, Vector3<f64>, f64)> =
-        searches.into_iter().flatten().filter_map(|search| search.told(limits)).collect();
-    let (of, best, sigma_m, gain) = found.into_iter().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))?;
+    let best = Compared::with("tool in poses", robot, (series, limits), hold, |compared| {
+        let searches = [PosesOf::Tool, PosesOf::Frame].map(|of| Search::new(compared, series, robot, of));
+        let found = searches.into_iter().flatten().filter_map(|search| search.told(limits));
+        found.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))
+    });
+    let (of, best, sigma_m, gain) = best?;
     let place_m = best.tool.fixed_rows::<3>(0).into_owned();
     let names = series.iter().filter(|s| s.readings_are_computed()).map(|s| s.name.clone()).collect();
     Some(ToolInPoses { series: names, of, place_m: place_m.into(), sigma_m: sigma_m.into(), gain })

@@ -92,9 +92,7 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
 }
 
 fn of_tool(robot: &Robot, series: &[MeasuredSeries], options: &Options) -> Option<ToolInPoses> {
-    tool_in_poses(robot, series, &options.limits, |start| {
-        options.selection.apply(&mut start.problem.layout, &mut start.state, &options.limits)
-    })
+    tool_in_poses(robot, series, &options.limits, |start| selected(start, options))
 }
 
 fn told_postures(
@@ -102,10 +100,13 @@ fn told_postures(
     series: (&[MeasuredSeries], Before),
     options: &Options,
 ) -> (Vec<MeasuredSeries>, Option<Told>) {
-    let (told, found) = told_by_images(robot, series, &options.limits, |start| {
-        options.selection.apply(&mut start.problem.layout, &mut start.state, &options.limits)
-    });
+    let (told, found) = told_by_images(robot, series, &options.limits, |start| selected(start, options));
     (told.into_owned(), found)
+}
+
+/// Holds what the options hold.
+fn selected(start: &mut Adjustment, options: &Options) -> Result<()> {
+    options.selection.apply(&mut start.problem.layout, &mut start.state, &options.limits)
 }
 
 /// The fit with the lenses and the robot model that the data support.
