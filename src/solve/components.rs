@@ -112,9 +112,15 @@ fn rounds(mut minimised: Minimised, (options, rough): (&ComponentOptions, &Setti
         let serves_on = fit.keep_factors(&factors);
         let noise = &fit.problem.noise;
         tracing::debug!(round, change, pixel = ?noise.pixel_factor, joint = ?noise.joint, "variance components");
+        // The next systems take the place of this one and its factor, and do not stand beside them.
+        let Fit { adjustment, linearised, covariance } = fit;
+        drop(covariance);
         minimised = match serves_on {
-            true => minimise_with_priors(fit.adjustment, fit.linearised, rough),
-            false => minimise_near(fit.adjustment, rough),
+            true => minimise_with_priors(adjustment, linearised, rough),
+            false => {
+                drop(linearised);
+                minimise_near(adjustment, rough)
+            }
         };
         iterations += minimised.outcome.iterations;
         if change < CONVERGED || minimised.outcome.status == Status::BadStart {
