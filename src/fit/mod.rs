@@ -4,5 +4,5 @@ mod evidence;
 mod free_poses;
 
 pub use crate::solve::Fit;
-pub use evidence::{log_evidence, log_evidence_of_fit};
+pub use evidence::{NoEvidence, fit_of_outcome, log_evidence, log_evidence_of_fit, log_evidence_of_outcome};
 pub use free_poses::{FocalLength, FreePose, FreePoses, PlacedCamera};

@@ -17,7 +17,7 @@ use super::solution::{Evidence, LensEvidence, Solution};
 use super::turns;
 use crate::diagnose::{ToolInPoses, follows_from_tool};
 use crate::error::{Notice, Result};
-use crate::fit::{Fit, log_evidence, log_evidence_of_fit};
+use crate::fit::{Fit, NoEvidence, log_evidence_of_fit, log_evidence_of_outcome};
 use crate::linalg::SymmetricFactor;
 use crate::model::joint_terms::RobotModel;
 use crate::model::robot::Robot;
@@ -121,30 +121,33 @@ struct Chosen {
 }
 
 fn choose(chain: &Chain, series: &[MeasuredSeries], options: &Options, by_joint_fit: &Options) -> Result<Chosen> {
-    let Lensed { fit: full, series, lenses, notices } = with_lenses(chain, series, by_joint_fit)?;
+    let Lensed { fit: full, series, lenses, mut notices } = with_lenses(chain, series, by_joint_fit)?;
     let widest = full.fit.state.robot.without_local_errors();
     let (fit, evidences) = match options.model_is_open() {
-        true => best_model(chain.clone(), &series, options, full)?,
+        true => best_model(chain.clone(), &series, options, (full, &mut notices))?,
         false => (full, Vec::new()),
     };
     let fit = near_nominal(chain.clone(), &series, options, fit)?;
     Ok(Chosen { fit, widest, series, evidences, lenses, notices })
 }
 
-/// The fit of the smallest robot model that the evidence supports, from that of the full one.
+/// The fit of the smallest robot model that the evidence supports, from that of the full one; that of the full one where it has none itself.
 fn best_model(
     chain: Chain,
     series: &[MeasuredSeries],
     options: &Options,
-    full: JointFit,
+    (full, notices): (JointFit, &mut Vec<Notice>),
 ) -> Result<(JointFit, Vec<Evidence>)> {
-    let (evidences, mut reduced): (Vec<_>, Vec<_>) = {
+    let (compared, without) = {
         let _stage = stage("evidence of robot models");
-        compare_models(&full.fit, options.joint_noise == JointNoise::Estimated).into_iter().unzip()
+        compare_models(&full.fit, options.joint_noise == JointNoise::Estimated)
     };
+    notices.extend(without.iter().map(|(model, why)| not_compared(*model, *why)));
+    let (evidences, mut reduced): (Vec<Evidence>, Vec<Adjustment>) = compared.into_iter().unzip();
+    let is_compared = evidences.iter().any(|e| e.model == RobotModel::Full);
     let supported = evidences.iter().enumerate().filter(|(_, e)| e.log_evidence > -options.limits.decisive_log_odds);
-    let largest = supported.max_by_key(|(_, e)| e.parameters).map(|(k, e)| (e.model, reduced.swap_remove(k)));
-    let chosen = match largest {
+    let largest = supported.max_by_key(|(_, e)| e.parameters).filter(|_| is_compared);
+    let chosen = match largest.map(|(k, e)| (e.model, reduced.swap_remove(k))) {
         None | Some((RobotModel::Full, _)) => full,
         Some((model, near)) => {
             let options = Options { model, ..options.clone() };
@@ -155,22 +158,41 @@ fn best_model(
     Ok((chosen, evidences))
 }
 
-/// Evidence of every model that a fit of the full one holds, and its optimum: of smaller ones with their own joint noise, where it is `estimated`.
-fn compare_models(full: &Fit, estimated: bool) -> Vec<(Evidence, Adjustment)> {
-    let models = [RobotModel::Rigid, RobotModel::Gear, RobotModel::Full];
-    let found = side_by_side(&full.problem, &models, |_, model| evidence(full, *model, estimated));
-    let mut all: Vec<_> = found.into_iter().flatten().collect();
-    let best = all.iter().map(|(e, _)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-    all.iter_mut().for_each(|(e, _)| e.log_evidence -= best);
-    all
+/// A model of which nobody knows how well the data support it.
+fn not_compared(model: RobotModel, why: NoEvidence) -> Notice {
+    let what = match model {
+        RobotModel::Full => format!("has no evidence, and no smaller one takes its place: {why}"),
+        _ => format!("has no evidence, and takes no part in the choice: {why}"),
+    };
+    Notice::new(why.code(), model.title(), what, "name a robot model with --robot-model to have its own fit")
 }
 
-fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> Option<(Evidence, Adjustment)> {
+/// What is known of every model that a fit of the full one holds: its evidence, and its optimum; and models that have none.
+type Compared = (Vec<(Evidence, Adjustment)>, Vec<(RobotModel, NoEvidence)>);
+
+/// Compares them: smaller ones with their own joint noise, where it is `estimated`.
+fn compare_models(full: &Fit, estimated: bool) -> Compared {
+    let models = [RobotModel::Rigid, RobotModel::Gear, RobotModel::Full];
+    let found = side_by_side(&full.problem, &models, |_, model| evidence(full, *model, estimated));
+    let (mut all, mut without) = (Vec::new(), Vec::new());
+    for (model, found) in models.into_iter().zip(found) {
+        match found {
+            Ok(found) => all.push(found),
+            Err(why) => without.push((model, why)),
+        }
+    }
+    let best = all.iter().map(|(e, _)| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    all.iter_mut().for_each(|(e, _): &mut (Evidence, Adjustment)| e.log_evidence -= best);
+    (all, without)
+}
+
+fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> std::result::Result<(Evidence, Adjustment), NoEvidence> {
     let dropped = dropped_terms(full, model);
     let whole = if dropped.is_empty() { full.adjustment.clone() } else { without_terms(full, &dropped) };
     let some = whole.some_stops(MANY_STOPS, SOME_STOPS);
     if dropped.is_empty() && some.is_none() {
-        return Some((told(full.linear(), model, log_evidence_of_fit(full)?), whole));
+        let log_evidence = log_evidence_of_fit(full).ok_or(NoEvidence::Undetermined)?;
+        return Ok((told(full.linear(), model, log_evidence), whole));
     }
     let mut smaller = some.unwrap_or(whole);
     let settings = Settings { decrement: DECREMENT, ..Settings::default() };
@@ -189,9 +211,10 @@ fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> Option<(Evidence,
         }
         false => solve(smaller, &settings),
     };
-    let linear = outcome.linear()?;
-    let evidence = told(linear, model, log_evidence(linear)?);
-    Some((evidence, outcome.adjustment))
+    let log_evidence = log_evidence_of_outcome(&outcome)?;
+    let linear = outcome.linear().ok_or(NoEvidence::Unfinished(outcome.status))?;
+    let evidence = told(linear, model, log_evidence);
+    Ok((evidence, outcome.adjustment))
 }
 
 /// Terms of the robot that a smaller model does not have.

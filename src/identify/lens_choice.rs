@@ -10,11 +10,11 @@ use super::solution::{LensEvidence, Solution};
 use crate::assess::{Limits, camera_shows_pattern};
 use crate::diagnose::LensNotInRos;
 use crate::error::{Code, Error, Notice, Result};
-use crate::fit::{FreePoses, log_evidence, log_evidence_of_fit};
+use crate::fit::{FreePoses, NoEvidence, fit_of_outcome, log_evidence_of_fit, log_evidence_of_outcome};
 use crate::model::camera::{Camera, Lens, fit_lens};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Family, LensChoice, MeasuredSeries, Problem, predict};
-use crate::solve::{ComponentOptions, LinearProblem, Outcome, Settings, Status, estimate_components, side_by_side};
+use crate::solve::{ComponentOptions, LinearProblem, Outcome, Settings, estimate_components, side_by_side};
 use crate::stage::stage;
 use crate::urdf::Chain;
 
@@ -52,7 +52,7 @@ pub(super) fn with_lenses(chain: &Chain, series: &[MeasuredSeries], options: &Op
     let mut series = series.to_vec();
     let open = if options.selection.names_cameras() { BTreeMap::new() } else { open_cameras(&series) };
     series.iter_mut().filter(|s| open.contains_key(&s.camera)).for_each(|s| s.lens = Lens::ALL[0]);
-    let (fit, notices) = match fit_model(chain.clone(), &series, options, None) {
+    let (fit, mut notices) = match fit_model(chain.clone(), &series, options, None) {
         Ok(fit) => (fit, Vec::new()),
         Err(error) => by_hold_out(chain, &mut series, &open, options).ok_or(error)?,
     };
@@ -60,7 +60,10 @@ pub(super) fn with_lenses(chain: &Chain, series: &[MeasuredSeries], options: &Op
     let mut better_series = series.clone();
     let mut lenses = Vec::new();
     for (camera, choice) in &open {
-        let (told, better) = compare_lenses(&fit, camera, *choice, &options.limits);
+        let (told, better) = compare_lenses(&fit, camera, *choice, &options.limits).unwrap_or_else(|why| {
+            notices.extend(not_compared(&fit.fit, camera, why));
+            (Vec::new(), None)
+        });
         lenses.extend(told);
         if let Some(better) = better {
             better_series.iter_mut().filter(|s| s.camera == *camera).for_each(|s| s.lens = better.lens());
@@ -133,20 +136,32 @@ fn by_hold_out(
     Some((fit, notices))
 }
 
+/// The lens of a camera that is kept because the fit with it has no evidence to which that of others could be compared.
+fn not_compared(fit: &Adjustment, camera: &str, why: NoEvidence) -> Option<Notice> {
+    let k = fit.problem.cameras.iter().position(|c| c == camera)?;
+    let what = format!("lens '{}' is kept, and no other was tried: {why}", fit.state.cameras[k].lens.name());
+    let remedy = "name a lens with --camera to have its own fit";
+    Some(Notice::new(why.code(), format!("camera {camera}"), what, remedy))
+}
+
 /// Evidence of the lenses for a camera, from the fit with its present one, and another one where that is better; of the present one alone, where its
 /// residuals show no pattern.
+///
+/// # Errors
+/// The present one has no evidence, or that of a part of many stops has none.
 fn compare_lenses(
     joint: &JointFit,
     camera: &str,
     choice: LensChoice,
     limits: &Limits,
-) -> (Vec<LensEvidence>, Option<BetterLens>) {
+) -> std::result::Result<(Vec<LensEvidence>, Option<BetterLens>), NoEvidence> {
     let _stage = stage("evidence of lenses");
     let fit = &joint.fit;
-    let Some(k) = fit.problem.cameras.iter().position(|c| c == camera) else { return (Vec::new(), None) };
-    let some = fit.adjustment.some_stops(MANY_STOPS, SOME_STOPS).map(|some| settled(some, ROUNDS));
-    let some = some.map(|some| (some.status == Status::Converged).then(|| some.fit().ok()).flatten());
-    let Some(present) = some.as_ref().map_or(Some(fit), Option::as_ref) else { return (Vec::new(), None) };
+    let Some(k) = fit.problem.cameras.iter().position(|c| c == camera) else { return Ok((Vec::new(), None)) };
+    let some = fit.adjustment.some_stops(MANY_STOPS, SOME_STOPS).map(|some| fit_of_outcome(settled(some, ROUNDS)));
+    let some = some.transpose()?;
+    let present = some.as_ref().unwrap_or(fit);
+    let of_present = log_evidence_of_fit(present).ok_or(NoEvidence::Undetermined)?;
     let lens = present.state.cameras[k].lens;
     let is_wide = fit.state.cameras[k].corner() > limits.fisheye_tangent;
     let depths = depths_m(&fit.problem, &joint.start.free)[k];
@@ -156,7 +171,7 @@ fn compare_lenses(
         _ => Lens::ALL.into_iter().filter(is_asked).collect(),
     };
     let found = side_by_side(&fit.problem, &lenses, |_, next| match *next == lens {
-        true => log_evidence_of_fit(present).map(|evidence| (told(present.linear(), k, evidence), None)),
+        true => Some((told(present.linear(), k, of_present), None)),
         false => evidence(&present.adjustment, (k, &depths), *next),
     });
     let mut all: Vec<(LensEvidence, Option<BetterLens>)> = found.into_iter().flatten().collect();
@@ -167,7 +182,7 @@ fn compare_lenses(
         e.taken = true;
         better.take()
     });
-    (all.into_iter().map(|(e, _)| e).collect(), better)
+    Ok((all.into_iter().map(|(e, _)| e).collect(), better))
 }
 
 /// Another lens than the present one, at its optimum.
@@ -207,8 +222,9 @@ fn evidence(
     // The size of a displacement field is found from above.
     let rounds = if lens.has_field() { FIELD_ROUNDS } else { ROUNDS };
     let outcome = settled(with_lens(fit, (camera, depths_m), lens)?, rounds);
-    let linear = outcome.linear().filter(|_| outcome.status == Status::Converged)?;
-    Some((told(linear, camera, log_evidence(linear)?), Some(BetterLens::of(linear, camera))))
+    let log_evidence = log_evidence_of_outcome(&outcome).ok()?;
+    let linear = outcome.linear()?;
+    Some((told(linear, camera, log_evidence), Some(BetterLens::of(linear, camera))))
 }
 
 /// The optimum near an adjustment. Image noise follows the lens; joint noise, tilt and the sizes of families stay.

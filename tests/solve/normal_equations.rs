@@ -4,6 +4,7 @@ use crate::support::dense::{Dense, Unknown};
 use crate::support::small::{Dice, Request, free_poses, problem};
 use nalgebra::{DMatrix, DVector, Vector3};
 use robotcal::assess::{Limits, clustered_covariance};
+use robotcal::fit::{NoEvidence, fit_of_outcome, log_evidence, log_evidence_of_outcome};
 use robotcal::identify::{PoseStage, linear_step};
 use robotcal::linalg::SymmetricFactor;
 use robotcal::model::camera::Lens;
@@ -316,4 +317,29 @@ fn two_halves_of_an_image_at_one_stop_say_what_the_whole_says() {
         let ratio = (one[(c, c)] / two[(c, c)]).sqrt();
         assert!((ratio - 1.0).abs() < 0.01, "second stage, {}: {ratio}", whole.problem.layout.columns[c].name);
     }
+}
+
+/// The cost where an iteration was broken off is not that of an optimum, and what nothing tells has no determinant.
+#[test]
+fn what_came_to_no_end_or_is_singular_has_no_evidence() {
+    let request = Request { images: 10, lattice: (5, 4), joint_noise: 3e-4, ..Request::default() };
+    let (mut problem, state) = problem(&mut Dice::new(15), &request);
+    problem.huber = f64::INFINITY;
+    let start = Adjustment { state: shaken(&problem, &state), problem };
+    let broken_off = solve(start.clone(), &Settings::new(1, 1e-9));
+    assert_eq!(broken_off.status, Status::OutOfIterations);
+    let why = NoEvidence::Unfinished(Status::OutOfIterations);
+    assert_eq!(log_evidence_of_outcome(&broken_off), Err(why));
+    assert_eq!(why.code(), robotcal::error::Code::NotConverged);
+    assert_eq!(fit_of_outcome(broken_off).err(), Some(why));
+
+    let mut ended = solve(start, &Settings::new(200, 1e-9));
+    assert_eq!(ended.status, Status::Converged);
+    assert_eq!(log_evidence_of_outcome(&ended).ok(), log_evidence(ended.linear().unwrap()));
+    assert!(fit_of_outcome(ended.clone()).is_ok());
+    // A prior that knows a free column exactly leaves no information that could be inverted.
+    let free = ended.adjustment.problem.layout.columns.iter_mut().find(|c| c.free).unwrap();
+    free.prior_sigma = 0.0;
+    assert_eq!(log_evidence_of_outcome(&ended), Err(NoEvidence::Undetermined));
+    assert_eq!(fit_of_outcome(ended).err(), Some(NoEvidence::Undetermined));
 }
