@@ -6,6 +6,7 @@ use std::path::Path;
 
 use robotcal::Code;
 use robotcal::assess::{View, predict_pose};
+use robotcal::diagnose::{Finding, Subject};
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::problem::{BodySeen, MeasuredSeries};
@@ -183,19 +184,24 @@ fn mistakes_in_what_stands_beside_the_arm_are_named() {
     }
 }
 
+/// Tracked poses of an arm on a rail; the errors of its readings have these sigmas, rad and m.
+fn on_rail(chain: &Chain, (rail, seed): (usize, u64), sigma: impl Fn(usize) -> f64) -> World {
+    let mut dice = Dice::new(seed);
+    let truth = truth(&mut dice, chain);
+    World::taken(dice, truth, Kind::Poses, 40, (5e-5, 1e-4), 2e-5, |dice| {
+        let mut q = readings(dice);
+        q.insert(rail, dice.between(-0.8, 0.8));
+        let errors = (0..q.len()).map(|k| dice.normal(sigma(k))).collect();
+        (q, errors)
+    })
+}
+
 /// The gear of a rail is as wrong as a tracker may be: links alone tell which of them it is.
 #[test]
 fn a_rail_that_moves_by_less_than_it_reads_is_no_fault_of_the_tracker() {
     let chain = with(RAIL).chain(None, Some("link_6")).unwrap();
     let rail = chain.readings.iter().position(|name| name == "rail").unwrap();
-    let mut dice = Dice::new(61);
-    let truth = truth(&mut dice, &chain);
-    let mut world = World::taken(dice, truth, Kind::Poses, 40, (5e-5, 1e-4), 2e-5, |dice| {
-        let mut q = readings(dice);
-        q.insert(rail, dice.between(-0.8, 0.8));
-        let errors = (0..q.len()).map(|_| dice.normal(2e-5)).collect();
-        (q, errors)
-    });
+    let mut world = on_rail(&chain, (rail, 61), |_| 2e-5);
     world.series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| q[rail] *= 1.002);
     let doubted = |series: MeasuredSeries| {
         let options = Options { model: RobotModel::Gear, ..Options::default() };
@@ -210,4 +216,25 @@ fn a_rail_that_moves_by_less_than_it_reads_is_no_fault_of_the_tracker() {
         }
     }
     assert!(doubted(off));
+}
+
+/// What is stated of the noise of a reading has the unit of its joint, m on a rail.
+#[test]
+fn the_noise_of_a_rail_is_a_length() {
+    let chain = with(RAIL).chain(None, Some("link_6")).unwrap();
+    let rail = chain.readings.iter().position(|name| name == "rail").unwrap();
+    let sigma = 4e-3;
+    for (noisy, unit) in [(rail, "m"), (rail + 1, "rad")] {
+        let world = on_rail(&chain, (rail, 62), |k| if k == noisy { sigma } else { 2e-5 });
+        let solution = world.solve_with(&Options::default());
+        let of_noise = solution.findings.iter().filter(|f| f.code() == Code::JointNoiseLarge);
+        let of_noise: Vec<&Finding> = of_noise.collect();
+        assert_eq!(of_noise.len(), 1, "{:?}", solution.findings);
+        let found = of_noise[0];
+        let noise = &found.quantities()[0];
+        println!("{}: {} {}", chain.readings[noisy], noise.value, noise.unit);
+        assert!(found.fails() && found.subjects().contains(&Subject::Joint(chain.readings[noisy].clone())));
+        assert_eq!(noise.unit, unit);
+        assert!((0.6 * sigma..1.6 * sigma).contains(&noise.value), "{}", noise.value);
+    }
 }

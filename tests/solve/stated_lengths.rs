@@ -1,13 +1,12 @@
 //! Stated distances that contradict all else, and several targets on one bracket: simulated robots with known truth.
 
 use nalgebra::Vector3;
-use robotcal::diagnose::{Carried, ContradictedDistances, Displaced, Finding, JointNoiseLarge, Weight};
+use robotcal::diagnose::{Carried, ContradictedDistances, Displaced, Finding};
 use robotcal::error::Code;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, Solution, identify};
 use robotcal::model::robot::Robot;
 use robotcal::problem::{BodySeen, MeasuredSeries, SeenBody, SeenLength};
-use robotcal::urdf::JointKind;
 
 use crate::measured_worlds::{Kind, World};
 use crate::support::small::Dice;
@@ -131,24 +130,5 @@ fn several_targets_that_slip_together_are_named_as_one() {
         let [found] = &all[..] else { panic!("{all:?}") };
         assert_eq!((found.body, found.images[0].as_str()), (Carried::Bracket, "018"));
         assert!((found.distance_m.0 - size).abs() < 0.1 * size, "{found:?}");
-    }
-}
-
-#[test]
-fn the_noise_of_a_rail_is_a_length() {
-    for (kind, unit) in [(JointKind::Prismatic, "m"), (JointKind::Revolute, "rad")] {
-        let noise = JointNoiseLarge {
-            series: "run".into(),
-            joint: "first".into(),
-            kind,
-            sigma: 2.7e-3,
-            worst_predicted: Vec::new(),
-            badly_seen: Vec::new(),
-            stands_still: None,
-            by_images: false,
-            readings_are_computed: false,
-            weight: Weight::Gate,
-        };
-        assert_eq!(Finding::from(noise).quantities()[0].unit, unit);
     }
 }
