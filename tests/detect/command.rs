@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use crate::said::{Said, assert_says};
+use image::{DynamicImage, GrayImage, Luma};
 use robotcal::Code;
 use robotcal::detect::{detect, detect_series, load};
 use robotcal::series::{Observation, Source, read};
@@ -139,6 +140,29 @@ fn what_is_no_file_among_the_images_is_left_out_alone() {
         let is_named = printed.split("\nnote ").any(|n| n.contains(name) && n.contains(code.name()));
         assert!(is_named, "{name} {code}: {printed}");
     }
+}
+
+/// A JPEG without a mark of its end may have all of its rows; one that ends before them is left out, and it alone.
+#[test]
+fn doctor_tells_a_jpeg_that_was_cut_off_from_one_without_a_mark_of_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let images = ["img_000.png", "img_001.png", "img_002.png"];
+    let run1 = small_series(folder.path(), &images);
+    let joints = std::fs::read_to_string(run1.join("joints.csv")).unwrap();
+    std::fs::write(run1.join("joints.csv"), joints.replace(".png", ".jpg")).unwrap();
+    let noisy = GrayImage::from_fn(400, 300, |x, y| Luma([(x * 7919 + y * 104_729 + x * y * 31) as u8]));
+    let whole = run1.join("images/img_000.jpg");
+    DynamicImage::ImageLuma8(noisy).save(&whole).unwrap();
+    let bytes = std::fs::read(&whole).unwrap();
+    std::fs::write(run1.join("images/img_001.jpg"), &bytes[..bytes.len() - 2]).unwrap();
+    std::fs::write(run1.join("images/img_002.jpg"), &bytes[..bytes.len() / 2]).unwrap();
+    images.iter().for_each(|image| std::fs::remove_file(run1.join("images").join(image)).unwrap());
+    let doctor = robotcal(&["doctor", name(&run1)]);
+    assert_eq!(doctor.status.code(), Some(0), "{}", text(&doctor));
+    let printed = String::from_utf8_lossy(&doctor.stdout);
+    let cut_off: Vec<&str> = printed.split("\nnote ").filter(|n| n.contains(Code::ImageTruncated.name())).collect();
+    assert!(cut_off.len() == 1 && cut_off[0].contains("img_002.jpg"), "{printed}");
+    assert!(!printed.contains("img_000.jpg") && !printed.contains("img_001.jpg"), "{printed}");
 }
 
 #[test]

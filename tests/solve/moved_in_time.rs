@@ -3,12 +3,14 @@
 
 use nalgebra::Vector6;
 use robotcal::Code;
-use robotcal::diagnose::{Carried, Displaced, Displacement, Finding, Quantity};
+use robotcal::assess::Limits;
+use robotcal::diagnose::{BodyMoved, Carried, Displaced, Displacement, Finding, Quantity, agreement};
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
+use robotcal::init::{HandEye, SeenStop};
 use robotcal::model::camera::Lens;
 use robotcal::plan::plate_design::{PlateRequest, design};
-use robotcal::problem::{LensChoice, MeasuredSeries};
+use robotcal::problem::{ImageRejection, LensChoice, MeasuredSeries, Problem};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::study::measured;
@@ -16,6 +18,7 @@ use robotcal::urdf::Chain;
 use std::path::Path;
 
 use crate::support::displaced::change;
+use crate::support::small::{Dice, Request, problem};
 
 const RADIUS_M: f64 = 0.01;
 
@@ -310,6 +313,33 @@ fn a_place_that_comes_and_goes_is_no_move() {
     };
     assert_eq!(told(&|k| k % 4 == 1), (Code::PlateMoved, 9, true));
     assert_eq!(told(&|k| k >= 27), (Code::PlateMoved, 9, false));
+}
+
+/// Images that fit and stand between those of another place tell of turns. What was left out tells nothing, nor do images of another placement.
+#[test]
+fn turns_are_told_by_images_that_fit_between() {
+    let request = Request { images: 24, placements: 2, ..Request::default() };
+    let (mut made, state) = problem(&mut Dice::new(9), &request);
+    let others = HandEye { camera: state.mountings[0], plate: state.placements[0] };
+    let elsewhere = others.plate * Pose::exp(&Vector6::new(0.05, 0.02, 0.0, 0.0, 0.0, 0.3));
+    let by_turns = |made: &Problem, images: &[usize]| {
+        let stop = |i: &usize| {
+            let readings = made.posture(*i).unwrap().readings.clone();
+            let (mount, tip) = (CameraMount::Hand, state.robot.base_from_tip(&readings));
+            SeenStop { camera_from_plate: mount.camera_from_plate(&others.camera, &tip, &elsewhere), readings, mount }
+        };
+        let seen: Vec<SeenStop> = images.iter().map(stop).collect();
+        let found = agreement(&state.robot, &others, &seen, &Limits::default()).unwrap();
+        assert_eq!(found.members, (0..images.len()).collect::<Vec<usize>>());
+        BodyMoved::of(made, images, found).unwrap().by_turns
+    };
+    // Every second image is of the first placement.
+    assert!(by_turns(&made, &[0, 4, 8, 12]));
+    assert!(!by_turns(&made, &[0, 2, 4, 6]));
+    assert!(!by_turns(&made, &[16, 18, 20, 22]));
+    made.images[6].rejected = Some(ImageRejection::Excluded);
+    assert!(!by_turns(&made, &[0, 4, 8, 12]));
+    assert!(by_turns(&made, &[0, 4, 8, 12, 16]));
 }
 
 /// Pictures of the camera turned by half a turn about the point that its axis meets.

@@ -1,5 +1,6 @@
-//! A result can be solved again from its own file: the same options, the same bits.
+//! A result comes out the same again: from its own file with the same options, and with any number of threads.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -48,4 +49,37 @@ fn from_its_own_file_a_result_is_solved_again_bit_for_bit_with_its_own_options()
     std::fs::write(at.join("wrong.toml"), "[limits]\nfewest = 0\n").unwrap();
     let refused = run(at, &["identify", "--from", "first/solution.json", "--config", "wrong.toml", "--out", "no"]);
     assert_eq!(refused.status.code(), Some(2));
+}
+
+/// Every file of a folder of results by its name.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
+    entries.map(|path| (name(&path), std::fs::read(&path).unwrap())).collect()
+}
+
+/// Detection, free poses, joint fit, evidence, hold-out, diagnoses, report: all that is written of a series of images.
+#[test]
+fn one_thread_two_and_four_write_the_same_files() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let urdf = root.join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let series = root.join("datasets/kr6_small");
+    let written = |threads: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
+        // Not by --threads: the record says how the program was called.
+        command.current_dir(folder.path()).env("RAYON_NUM_THREADS", threads).args(["identify", "--out", "out"]);
+        let output = command.arg("--urdf").arg(&urdf).arg("--series").arg(&series).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        files(&folder.path().join("out"))
+    };
+    let one = written("1");
+    assert!(["solution.json", "observations.csv", "report.html"].iter().all(|name| one.contains_key(*name)));
+    for threads in ["2", "4"] {
+        let more = written(threads);
+        assert!(one.keys().eq(more.keys()), "{:?} {:?}", one.keys(), more.keys());
+        for (name, bytes) in &one {
+            assert!(bytes == &more[name], "{name} differs with {threads} threads");
+        }
+    }
 }
