@@ -15,6 +15,7 @@ use super::near_nominal::near_nominal;
 use super::options::{JointNoise, Options};
 use super::solution::{Evidence, LensEvidence, Solution};
 use super::turns;
+use crate::assess::Limits;
 use crate::diagnose::{ToolInPoses, follows_from_tool};
 use crate::error::{Notice, Result};
 use crate::fit::{Fit, NoEvidence, log_evidence_of_fit, log_evidence_of_outcome};
@@ -144,10 +145,8 @@ fn best_model(
     };
     notices.extend(without.iter().map(|(model, why)| not_compared(*model, *why)));
     let (evidences, mut reduced): (Vec<Evidence>, Vec<Adjustment>) = compared.into_iter().unzip();
-    let is_compared = evidences.iter().any(|e| e.model == RobotModel::Full);
-    let supported = evidences.iter().enumerate().filter(|(_, e)| e.log_evidence > -options.limits.decisive_log_odds);
-    let largest = supported.max_by_key(|(_, e)| e.parameters).filter(|_| is_compared);
-    let chosen = match largest.map(|(k, e)| (e.model, reduced.swap_remove(k))) {
+    let largest = largest_supported(&evidences, &options.limits);
+    let chosen = match largest.map(|k| (evidences[k].model, reduced.swap_remove(k))) {
         None | Some((RobotModel::Full, _)) => full,
         Some((model, near)) => {
             let options = Options { model, ..options.clone() };
@@ -156,6 +155,13 @@ fn best_model(
         }
     };
     Ok((chosen, evidences))
+}
+
+/// The largest model that none beats decisively, by its place; `None` where the full one has no evidence, so that nothing beats it.
+fn largest_supported(evidences: &[Evidence], limits: &Limits) -> Option<usize> {
+    let is_compared = evidences.iter().any(|e| e.model == RobotModel::Full);
+    let supported = evidences.iter().enumerate().filter(|(_, e)| e.log_evidence > -limits.decisive_log_odds);
+    supported.max_by_key(|(_, e)| e.parameters).map(|(k, _)| k).filter(|_| is_compared)
 }
 
 /// A model of which nobody knows how well the data support it.
@@ -254,4 +260,23 @@ fn told(linear: LinearProblem, model: RobotModel, log_evidence: f64) -> Evidence
     let layout = &linear.adjustment.problem.layout;
     let parameters = layout.columns[layout.robot()].iter().filter(|c| c.free).count();
     Evidence { model, log_evidence, cost: linear.lin.cost, parameters }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where the full model has no evidence, that of a smaller one beats nothing.
+    #[test]
+    fn a_smaller_model_takes_the_place_of_one_that_it_was_compared_with() {
+        let of = |model, log_evidence, parameters| Evidence { model, log_evidence, cost: 1.0, parameters };
+        let [rigid, gear] = [of(RobotModel::Rigid, 0.0, 48), of(RobotModel::Gear, -1.0, 78)];
+        let largest = |full| {
+            let all: Vec<Evidence> = [rigid.clone(), gear.clone()].into_iter().chain(full).collect();
+            largest_supported(&all, &Limits::default())
+        };
+        assert_eq!(largest(Some(of(RobotModel::Full, -20.0, 108))), Some(1));
+        assert_eq!(largest(Some(of(RobotModel::Full, -2.0, 108))), Some(2));
+        assert_eq!(largest(None), None);
+    }
 }
