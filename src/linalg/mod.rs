@@ -7,7 +7,7 @@ mod quadratic;
 mod wide;
 
 pub use quadratic::{LinearRow, NotSolved, minimise_quadratic};
-pub use wide::{add_combination, add_scaled, sum_of_products, wide};
+pub use wide::{add_combination, sum_of_products, wide};
 
 use std::ops::Range;
 

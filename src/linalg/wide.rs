@@ -8,11 +8,14 @@ pub fn wide<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(work)
 }
 
-/// `into += a s + b t`.
+/// `into += a s + b t + ..`, over the length of the shortest.
 #[inline(always)]
-pub fn add_combination(into: &mut [f64], [a, b]: [&[f64]; 2], [s, t]: [f64; 2]) {
-    for ((x, a), b) in into.iter_mut().zip(a).zip(b) {
-        *x += a * s + b * t;
+pub fn add_combination<const N: usize>(into: &mut [f64], of: [&[f64]; N], by: [f64; N]) {
+    let length = of.iter().fold(into.len(), |least, row| least.min(row.len()));
+    // All of one length, so that no index is looked at in the loop.
+    let of = of.map(|row| &row[..length]);
+    for (k, x) in into[..length].iter_mut().enumerate() {
+        *x += (1..N).fold(of[0][k] * by[0], |sum, n| sum + of[n][k] * by[n]);
     }
 }
 
@@ -28,10 +31,4 @@ pub fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
-}
-
-/// `into += a s`.
-#[inline(always)]
-pub fn add_scaled(into: &mut [f64], a: &[f64], s: f64) {
-    into.iter_mut().zip(a).for_each(|(x, a)| *x += a * s);
 }

@@ -23,7 +23,7 @@ use super::fit::{Saddle, Term};
 use super::model::PARAMETERS;
 use super::raster::{LAGS, NONE, OddPart, REACH, Raster, SIDE};
 use super::small_windows::{Seen, unfollowed};
-use crate::linalg::{add_scaled, sum_of_products, wide};
+use crate::linalg::{add_combination, sum_of_products, wide};
 
 /// What print, lens and blur of other shapes leave beyond the noise, px per axis; seen on real boards after their
 /// printing errors are taken out.
@@ -131,8 +131,8 @@ fn sum(terms: &[Term], noise: &Correlation) -> [f64; 3] {
         || {
             for (lag, correlation) in noise.0.iter().enumerate().skip(NONE) {
                 let (ahead, weight) = (raster.ahead(lag), if lag == NONE { *correlation } else { 2.0 * correlation });
-                add_scaled(&mut moved[0], &u[ahead..], weight);
-                add_scaled(&mut moved[1], &v[ahead..], weight);
+                add_combination(&mut moved[0], [&u[ahead..]], [weight]);
+                add_combination(&mut moved[1], [&v[ahead..]], [weight]);
             }
             let mixed = sum_of_products(&u, &moved[1]) + sum_of_products(&v, &moved[0]);
             [sum_of_products(&u, &moved[0]), 0.5 * mixed, sum_of_products(&v, &moved[1])]
