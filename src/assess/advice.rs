@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::limits::Limits;
+use super::statistics::extent;
 use super::stops::{StopsKnowledge, Structural, range_of};
 use crate::model::robot::{Posture, Robot};
 use crate::problem::Layout;
@@ -64,10 +65,7 @@ impl<'a> Adviser<'a> {
     ) -> Self {
         let readings = robot.chain.readings.len();
         let n = known.columns.len();
-        let range = |r: usize| {
-            let all = stops.iter().map(|s| s.readings[r]);
-            (all.clone().fold(f64::INFINITY, f64::min), all.fold(f64::NEG_INFINITY, f64::max))
-        };
+        let range = |r: usize| extent(stops.iter().map(|s| s.readings[r]));
         let mut candidates = Vec::new();
         for base in stops.iter().step_by((stops.len() / BASES).max(1)).take(BASES) {
             for reading in 0..readings {

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::limits::Limits;
 use super::mean_square::MeanSquare;
 use super::root_mean_square;
+use super::statistics::extent;
 use super::stops::{halton_stops, range_of};
 use super::used_stops::{still, stops};
 use crate::geom::{Pose, adjoint};
@@ -107,10 +108,7 @@ impl<'a> FlangeModel<'a> {
         }
         let robot = robot.without_local_errors();
         let readings = robot.chain.readings.len();
-        let range = |r: usize| {
-            let all = stops.iter().map(|s| s.readings[r]);
-            (all.clone().fold(f64::INFINITY, f64::min), all.fold(f64::NEG_INFINITY, f64::max))
-        };
+        let range = |r: usize| extent(stops.iter().map(|s| s.readings[r]));
         let mut model = Self {
             exported: robot.as_exported(),
             robot,

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::advice::{Advice, Adviser};
 use super::limits::Limits;
+use super::statistics::extent;
 use super::stops::{StopsKnowledge, Structural, information_of_share, structural};
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::{Posture, Robot};
@@ -181,11 +182,10 @@ fn judge(
 
 /// Smallest and largest reading of every joint.
 fn covered(robot: &Robot, stops: &[Posture]) -> Vec<(String, f64, f64)> {
-    let range = |r: usize| {
-        let readings = stops.iter().map(|s| s.readings[r]);
-        (readings.clone().fold(f64::INFINITY, f64::min), readings.fold(f64::NEG_INFINITY, f64::max))
+    let named = |(r, name): (usize, &String)| {
+        let (low, high) = extent(stops.iter().map(|s| s.readings[r]));
+        (name.clone(), low, high)
     };
-    let named = |(r, name): (usize, &String)| (name.clone(), range(r).0, range(r).1);
     if stops.is_empty() { Vec::new() } else { robot.chain.readings.iter().enumerate().map(named).collect() }
 }
 

@@ -6,6 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+use crate::init::upper_median;
+
 /// A ratio with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Ratio {
@@ -64,17 +66,20 @@ pub fn by_cluster(clusters: &[usize], units: &[(f64, f64)]) -> Vec<(f64, f64)> {
     sums.into_values().collect()
 }
 
+/// The smallest and the largest value; infinite of nothing.
+pub(super) fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+}
+
 /// Root of the mean square of `(sum of squares, weight)` units.
 pub fn root_mean_square(units: &[(f64, f64)]) -> f64 {
     let (s, w) = units.iter().fold((0.0, 0.0), |(s, w), u| (s + u.0, w + u.1));
     (s / w).sqrt()
 }
 
-/// Median; `None` of nothing.
+/// Median, of an even number the larger of both; `None` of nothing.
 pub fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied()
+    (!values.is_empty()).then(|| upper_median(values.to_vec()))
 }
 
 /// Logarithm of the probability that so many parameters explain this share of so many squares or more, of Gaussian noise; of an odd number
