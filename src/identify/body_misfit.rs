@@ -2,7 +2,7 @@
 
 use super::points_start::{PointAt, agreeing, once_a_posture, usual_distance};
 use crate::geom::Pose;
-use crate::init::{PosePair, solve_hand_eye};
+use crate::init::{PosePair, hand_eye_misfit};
 use crate::model::robot::Robot;
 use crate::problem::{BodyMeasurement, BodySeen, Problem};
 
@@ -44,7 +44,7 @@ pub(super) fn usual_misfit(robot: &Robot, seen: &[SeenAt]) -> f64 {
     };
     let pairs: Vec<PosePair> = seen.iter().zip(&tips).filter_map(pair).collect();
     if pairs.len() >= FEWEST_POSES {
-        return solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error);
+        return hand_eye_misfit(&pairs);
     }
     let points = once_a_posture(&seen.iter().map(|s| s.seen.position()).zip(tips).collect::<Vec<PointAt>>());
     agreeing(&points).map_or(f64::INFINITY, |placed| usual_distance(&points, &placed))

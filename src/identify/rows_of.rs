@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::body_misfit::{SeenAt, usual_misfit};
 use crate::assess::Limits;
 use crate::diagnose::RowsOf;
-use crate::init::{PosePair, solve_hand_eye};
+use crate::init::{PosePair, hand_eye_misfit};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, BodyMeasurement, BodySeen, InstrumentKind, Problem};
 
@@ -47,7 +47,7 @@ pub(super) fn rows_of_images(
         is_other
             && pairs.len() >= limits.hand_eye_images
             && are_same(&own, &stops_of(group))
-            && solve_hand_eye(&pairs).first().is_some_and(|s| s.median_error < limits.suspicious_misfit)
+            && hand_eye_misfit(&pairs) < limits.suspicious_misfit
     };
     if all.iter().any(fits) {
         return RowsOf::Camera;

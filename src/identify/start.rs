@@ -12,7 +12,9 @@ use crate::diagnose::{Finding, Mistake};
 use crate::error::{Code, Error, Quantity, Result};
 use crate::fit::FreePoses;
 use crate::geom::log_so3;
-use crate::init::{HandEye, HandEyeStart, PosePair, SeenStop, Zeros, shah, solve_hand_eye, solve_zeros, upper_median};
+use crate::init::{
+    HandEye, HandEyeStart, PosePair, SeenStop, Zeros, hand_eye_misfit, shah, solve_hand_eye, solve_zeros, upper_median,
+};
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
 use crate::problem::{
@@ -140,7 +142,7 @@ fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
     if of_all < limits.suspicious_misfit {
         return;
     }
-    let as_described = solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error);
+    let as_described = hand_eye_misfit(&pairs);
     if as_described < limits.suspicious_misfit {
         return;
     }
@@ -249,7 +251,7 @@ fn check_shared(
     if misfit < limits.suspicious_misfit || pairs.len() < limits.hand_eye_images {
         return Ok(());
     }
-    let alone = solve_hand_eye(&poses).first().map_or(f64::INFINITY, |s| s.median_error);
+    let alone = hand_eye_misfit(&poses);
     if alone < limits.suspicious_misfit && alone < limits.mistake_explains * misfit {
         let what = format!(
             "by themselves its {} images fit to {:.1} (mm plus mrad), with what they share with others they miss by {:.0}: camera or plate were \

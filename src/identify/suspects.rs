@@ -9,7 +9,7 @@ use crate::assess::Limits;
 use crate::diagnose::MistakeKind;
 use crate::error::Code;
 use crate::geom::Pose;
-use crate::init::{PosePair, SeenStop, plate_scale, solve_hand_eye, upper_median};
+use crate::init::{PosePair, SeenStop, hand_eye_misfit, plate_scale, solve_hand_eye, upper_median};
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
 use crate::series::{CameraMount, LENGTH_UNITS, spread};
@@ -120,7 +120,7 @@ impl Suspects<'_> {
         let placed = bases::found(self.robot).and_then(|joint| bases::placed(self.robot, joint, &stops));
         let robot = placed.as_ref().unwrap_or(self.robot);
         let pairs: Vec<PosePair> = some_of(stops.len()).map(|k| stops[k].pair(robot)).collect();
-        solve_hand_eye(&pairs).first().map_or(f64::INFINITY, |s| s.median_error)
+        hand_eye_misfit(&pairs)
     }
 
     /// Camera in the hand and fixed camera exchanged.

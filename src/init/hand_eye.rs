@@ -79,6 +79,11 @@ pub fn upper_median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
+/// Median misfit of the best closed form, rad plus m; infinite where none has a solution.
+pub fn hand_eye_misfit(pairs: &[PosePair]) -> f64 {
+    solve_hand_eye(pairs).first().map_or(f64::INFINITY, |start| start.median_error)
+}
+
 type ClosedForm = fn(&[PosePair]) -> Option<HandEye>;
 
 const CLOSED_FORMS: [(&str, ClosedForm); 3] = [
