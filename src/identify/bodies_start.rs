@@ -61,13 +61,23 @@ fn leave_out_others(adjustment: &mut Adjustment, measured: &[usize], placed: &Pl
     let (rows, points): (Vec<usize>, Vec<PointAt>) =
         points.filter_map(|&k| Some((k, point_at(adjustment, &all[k])?))).unzip();
     let bound = f64::max(limits.suspicious_misfit, DISAGREES * usual_distance(&points, placed));
-    let far = rows.into_iter().zip(distances(&points, placed)).filter(|(_, distance)| *distance > bound);
-    let far: Vec<(usize, f64)> = far.collect();
-    if far.len() as f64 > limits.share_of_images_left_out * points.len() as f64 {
+    leave_far_out(&mut adjustment.problem, rows.into_iter().zip(distances(&points, placed)), bound, limits);
+}
+
+/// Leaves out measurements that miss by more than this, m, where they are no more than may be left out of all.
+fn leave_far_out(
+    problem: &mut Problem,
+    missed: impl ExactSizeIterator<Item = (usize, f64)>,
+    bound: f64,
+    limits: &Limits,
+) {
+    let most = limits.share_of_images_left_out * missed.len() as f64;
+    let far: Vec<(usize, f64)> = missed.filter(|(_, distance)| *distance > bound).collect();
+    if far.len() as f64 > most {
         return;
     }
     for (k, distance) in far {
-        let measured = &mut adjustment.problem.body_measurements[k];
+        let measured = &mut problem.body_measurements[k];
         measured.rejected = Some(BodyRejection::Residual { sigmas: distance / measured.sigma_m });
     }
 }
@@ -75,10 +85,9 @@ fn leave_out_others(adjustment: &mut Adjustment, measured: &[usize], placed: &Pl
 fn too_few(problem: &Problem, instrument: usize, found: usize, needed: usize) -> Error {
     let instrument = &problem.instruments[instrument];
     let what = format!("only {found} measurements at stops of the robot, at least {needed} are needed");
-    let place = format!("{} {}", instrument.kind.block(), instrument.name);
     Error::new(
         Code::MeasurementsTooFew,
-        place,
+        instrument.place(),
         what,
         "measure at more stops, with the tip turned to different directions",
     )
@@ -148,14 +157,9 @@ fn start_sockets(
         in_sockets(&held, most_out).and_then(|found| median(&found.misfits(&held))).unwrap_or(f64::INFINITY)
     })?;
     // What sat in another socket than is said would spoil the noise of all before it is left out by its residual.
-    let bound = f64::max(limits.suspicious_misfit, DISAGREES * median(&found.misfits(&held)).unwrap_or(0.0));
-    let far = all.into_iter().zip(found.misfits(&held)).filter(|(_, misfit)| *misfit > bound);
-    let far: Vec<(usize, f64)> = far.collect();
-    let is_a_part = far.len() as f64 <= most_out * held.len() as f64;
-    for (k, misfit) in far.into_iter().filter(|_| is_a_part) {
-        let measured = &mut adjustment.problem.body_measurements[k];
-        measured.rejected = Some(BodyRejection::Residual { sigmas: misfit / measured.sigma_m });
-    }
+    let misfits = found.misfits(&held);
+    let bound = f64::max(limits.suspicious_misfit, DISAGREES * median(&misfits).unwrap_or(0.0));
+    leave_far_out(&mut adjustment.problem, all.into_iter().zip(misfits), bound, limits);
     let at = |place: Vector3<f64>| Pose::new(Matrix3::identity(), place);
     adjustment.state.bodies[body] = at(found.body);
     for (instrument, place) in found.places {

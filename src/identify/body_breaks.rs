@@ -116,7 +116,7 @@ impl Moved {
         );
         let quantities =
             vec![Quantity::new("distance", self.distance_m, "m"), Quantity::new("angle", self.angle_rad, "rad")];
-        let place = format!("{} {}, stop {stop}", instrument.kind.block(), instrument.name);
+        let place = format!("{}, stop {stop}", instrument.place());
         Error { quantities, ..Error::new(code, place, what, remedy) }
     }
 }

@@ -54,7 +54,7 @@ pub(super) fn name_mistake(
         .filter(|(left, _)| *left < limits.mistake_explains * as_described && *left < limits.suspicious_misfit);
     best.map_or(Ok(()), |(left, kind)| {
         let instrument = &problem.instruments[given[0].instrument];
-        let of = format!("{} {}", instrument.kind.block(), instrument.name);
+        let of = instrument.place();
         let rows_of = rows_of_bodies(adjustment, measured, limits);
         let mistake = Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of };
         Err(Finding::from(mistake).refusal())

@@ -76,7 +76,7 @@ pub(super) fn name_exchange(adjustment: &Adjustment, measured: &[usize], limits:
         what: format!("the places {a} and {b} are exchanged: each in the place of the other the touches fit"),
         remedy: "exchange them in contacts.csv".into(),
     };
-    let of = format!("{} {}", instrument.kind.block(), instrument.name);
+    let of = instrument.place();
     let rows_of = RowsOf::Readings;
     let mistake = Mistake { kind, of, misfit, misfit_undone: Some(left), by_images: false, rows_of };
     Err(Finding::from(mistake).refusal())

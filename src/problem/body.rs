@@ -72,6 +72,13 @@ pub struct Instrument {
     pub component: usize,
 }
 
+impl Instrument {
+    /// What it is and its name, as people are told.
+    pub fn place(&self) -> String {
+        format!("{} {}", self.kind.block(), self.name)
+    }
+}
+
 /// What an instrument saw of a body, in its frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BodySeen {
