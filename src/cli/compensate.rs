@@ -11,7 +11,7 @@ use super::Verdict;
 use super::compensate_frames::{Choice, Side, Sides, known_error};
 use super::compensate_models::{equal, exchanged, not_given};
 use super::robot::noted_chain;
-use super::say::{say, say_line};
+use super::say::{self, say, say_line};
 use crate::diagnose::Weight;
 use crate::error::{Code, Error, Result};
 use crate::files;
@@ -202,9 +202,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     place.write_beside(&written, &args.programs)?;
     say!("{}", text(&program, &done.outcomes, &left, &controller.chain));
     // Targets that are left are listed already.
-    for f in findings.iter().filter(|f| f.code != Code::TargetsLeft) {
-        say_line!("{}{} [{}]", if f.weight == Weight::Gate { "GATE      " } else { "note      " }, f.text, f.code);
-    }
+    say::findings(findings.iter().filter(|f| f.code != Code::TargetsLeft));
     let good = left.is_empty() && findings.iter().all(|f| f.weight == Weight::Note);
     let gates: Vec<&str> = findings.iter().filter(|f| f.weight == Weight::Gate).map(|f| f.code.name()).collect();
     match good {

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 
 use super::Verdict;
 use super::pose_argument::pose;
-use super::say::{say, say_line};
+use super::say::{self, say, say_line};
 use super::show::read_solution;
 use crate::assess::Limits;
 use crate::diagnose::{Mistake, Weight};
@@ -138,9 +138,7 @@ pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
     for notice in &notices {
         say_line!("note      {}", notice.coded());
     }
-    for f in &findings {
-        say_line!("{}{} [{}]", if f.weight == Weight::Gate { "GATE      " } else { "note      " }, f.text, f.code);
-    }
+    say::findings(&findings);
     say_line!("results   {} ({})", args.out.display(), files.keys().cloned().collect::<Vec<_>>().join(", "));
     Ok(if findings.iter().all(|f| f.weight == Weight::Note) { Verdict::Good } else { Verdict::GateFailed })
 }

@@ -12,6 +12,7 @@ use super::arguments::pair;
 use super::choices::Model;
 use super::plan_targets::targets;
 use super::plan_touches::{self, TouchArgs};
+use super::pose_argument::pose_or_file;
 use super::robot::{noted_chain, read_chain, refuse_degrees};
 use super::say::say;
 use super::show::read_solution;
@@ -24,7 +25,7 @@ use crate::output::camera_formats::read_camera_file;
 use crate::output::{ResultFolder, plan_files, plan_html, plan_programs, plan_start, sigma_text};
 use crate::plan::candidates::CandidateOptions;
 use crate::plan::refine::USUAL_ROUNDS;
-use crate::plan::scene::{self, SceneOptions, arm_length_m};
+use crate::plan::scene::{self, SceneOptions};
 use crate::plan::setting::{PlannedStop, Setting};
 use crate::plan::viewpoint::ViewRange;
 use crate::plan::visibility::VisibilityLimits;
@@ -85,11 +86,11 @@ pub(super) struct PlanArgs {
     /// Where the camera is
     #[arg(long, value_enum, default_value_t = Mount::Hand, help_heading = "Camera and plate")]
     mount: Mount,
-    /// Camera on the flange (for a fixed camera: in the base frame), roughly: x,y,z,roll,pitch,yaw in m and degrees, or a file
+    /// Camera on the flange (for a fixed camera: in the base frame), roughly: x,y,z[,roll,pitch,yaw] in m and degrees, or a file
     /// like hand_camera.yaml [default: 80 mm before the flange, looking along its z]
     #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true, help_heading = "Camera and plate")]
     hand_camera: Option<String>,
-    /// Plate in the base frame (for a fixed camera: on the flange), roughly: x,y,z,roll,pitch,yaw in m and degrees, or a file;
+    /// Plate in the base frame (for a fixed camera: on the flange), roughly: x,y,z[,roll,pitch,yaw] in m and degrees, or a file;
     /// several times for several places [default: on the table before the robot]
     #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true, help_heading = "Camera and plate")]
     plate_pose: Vec<String>,
@@ -184,15 +185,6 @@ fn numbers(flag: &str, text: &str, count: usize, remedy: &str) -> Result<Vec<f64
     Ok(all)
 }
 
-/// A pose as six numbers, or of a file.
-fn pose(flag: &str, text: &str) -> Result<Pose> {
-    if Path::new(text).is_file() {
-        return plan_start::read_pose(Path::new(text));
-    }
-    let v = numbers(flag, text, 6, "give x,y,z,roll,pitch,yaw in m and degrees, or a file that exists")?;
-    Ok(Pose::from_xyz_rpy([v[0], v[1], v[2]], [v[3], v[4], v[5]].map(f64::to_radians)))
-}
-
 pub(super) fn run(args: &PlanArgs) -> Result<Verdict> {
     if let (Some(points), Some(from)) = (&args.touches.touch, &args.from) {
         return plan_touches::run(&args.touches, points, from, args.targets.as_deref(), args.count, &args.out);
@@ -258,7 +250,7 @@ fn settle_place(args: &PlanArgs, request: &mut PlanRequest) -> Result<Vec<String
     if !free {
         return Ok(Vec::new());
     }
-    let arm = arm_length_m(&request.setting.robot);
+    let arm = request.setting.robot.chain.arm_length_m();
     let place = |name: &str, far: f64, high: f64, tilt_deg: f64| {
         let pose = Pose::from_xyz_rpy([far * arm, 0.0, high * arm], [0.0, -tilt_deg.to_radians(), 0.0]);
         (format!("{name} (x {:.2} m, z {:.2} m, tilted {tilt_deg:.0} degrees)", far * arm, high * arm), pose)
@@ -404,7 +396,7 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)>
         let record = read_solution(path)?;
         let (mut setting, taken) = plan_start::from_solution(&record, chain, model)?;
         for (k, text) in args.plate_pose.iter().enumerate() {
-            setting.placements.push((format!("new_{k}"), pose("--plate-pose", text)?));
+            setting.placements.push((format!("new_{k}"), pose_or_file("--plate-pose", text)?));
         }
         return Ok((setting, taken));
     }
@@ -416,7 +408,7 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)>
     let robot = model.robot(chain);
     let mount: CameraMount = args.mount.into();
     let mounting = match (&args.hand_camera, mount) {
-        (Some(text), _) => pose("--hand-camera", text)?,
+        (Some(text), _) => pose_or_file("--hand-camera", text)?,
         (None, CameraMount::Hand) => Pose::from_xyz_rpy([0.0, 0.0, 0.08], [0.0; 3]),
         (None, CameraMount::Fixed) => {
             return Err(Error::new(
@@ -429,11 +421,11 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)>
     };
     let mut placements = Vec::new();
     for (k, text) in args.plate_pose.iter().enumerate() {
-        placements.push((format!("placement_{k}"), pose("--plate-pose", text)?));
+        placements.push((format!("placement_{k}"), pose_or_file("--plate-pose", text)?));
     }
     if placements.is_empty() {
         let place = match mount {
-            CameraMount::Hand => Pose::from_xyz_rpy([0.5 * arm_length_m(&robot), 0.0, 0.0], [0.0; 3]),
+            CameraMount::Hand => Pose::from_xyz_rpy([0.5 * robot.chain.arm_length_m(), 0.0, 0.0], [0.0; 3]),
             CameraMount::Fixed => Pose::from_xyz_rpy([0.0, 0.0, 0.05], [0.0; 3]),
         };
         placements.push(("placement_0".to_owned(), place));

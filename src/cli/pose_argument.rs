@@ -1,7 +1,10 @@
 //! A pose on the command line.
 
+use std::path::Path;
+
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
+use crate::output::plan_start::read_pose;
 
 /// `x,y,z[,roll,pitch,yaw]` in m and degrees; `None` where nothing is given.
 ///
@@ -17,4 +20,25 @@ pub(super) fn pose(flag: &str, numbers: &[f64]) -> Result<Option<Pose>> {
             Err(Error::new(Code::OptionRange, flag, what, "give x,y,z or x,y,z,roll,pitch,yaw, in metres and degrees"))
         }
     }
+}
+
+/// A pose as [`pose`] takes it, or that of a file.
+///
+/// # Errors
+/// Neither.
+pub(super) fn pose_or_file(flag: &str, text: &str) -> Result<Pose> {
+    if Path::new(text).is_file() {
+        return read_pose(Path::new(text));
+    }
+    let number = |part: &str| part.trim().parse().ok().filter(|v: &f64| v.is_finite());
+    let numbers: Vec<f64> = text.split(',').map(number).collect::<Option<_>>().unwrap_or_default();
+    pose(flag, &numbers)?.ok_or_else(|| {
+        let remedy = "give x,y,z[,roll,pitch,yaw] in metres and degrees, or a file that exists";
+        Error::new(
+            Code::OptionRange,
+            flag,
+            format!("\"{text}\" is neither a file nor numbers with commas between"),
+            remedy,
+        )
+    })
 }

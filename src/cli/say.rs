@@ -4,6 +4,9 @@ use std::fmt;
 use std::io::{self, ErrorKind, Write};
 use std::sync::OnceLock;
 
+use crate::diagnose::Weight;
+use crate::output::corrections::FileFinding;
+
 /// Why nothing more is said.
 static ENDED: OnceLock<io::Error> = OnceLock::new();
 
@@ -21,6 +24,14 @@ pub(super) fn text(words: fmt::Arguments) {
 /// Why the output did not reach its reader; none where the reader closed it.
 pub(super) fn failure() -> Option<&'static io::Error> {
     ENDED.get().filter(|e| e.kind() != ErrorKind::BrokenPipe)
+}
+
+/// Says findings of files with their codes, line by line.
+pub(super) fn findings<'a>(all: impl IntoIterator<Item = &'a FileFinding>) {
+    for f in all {
+        let rank = if f.weight == Weight::Gate { "GATE      " } else { "note      " };
+        text(format_args!("{rank}{} [{}]\n", f.text, f.code));
+    }
 }
 
 /// As `print!`, without a panic where stdout is closed.

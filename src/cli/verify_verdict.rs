@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Verdict;
-use super::say::say_line;
+use super::say::{self, say_line};
 use super::verify_stated::{Expectation, Stated};
 use crate::assess::{Limits, Ratio};
 use crate::diagnose::{Finding, Weight};
@@ -89,9 +89,7 @@ impl Reasons {
 
     /// Says all of it.
     pub fn verdict(self) -> Verdict {
-        for f in &self.findings {
-            say_line!("{}{} [{}]", if f.weight == Weight::Gate { "GATE      " } else { "note      " }, f.text, f.code);
-        }
+        say::findings(&self.findings);
         let gates: Vec<&str> =
             self.findings.iter().filter(|f| f.weight == Weight::Gate).map(|f| f.code.name()).collect();
         let is_own = self.has(Code::OwnMeasurement);

@@ -5,7 +5,7 @@
 
 use super::Picture;
 use super::board_labels::{BoardSize, Labelling, Lattice, Placement, Shader, parity};
-use super::board_seen::{REACH, SQUARES, even_cells, trimmed};
+use super::board_seen::{Beyond, Range, SQUARES, even_cells, followed, trimmed};
 
 /// How far from the end of the squares they are looked at, px ...
 const BESIDE_PX: f64 = 2.5;
@@ -24,19 +24,10 @@ const LEAST_PAIRS: usize = 3;
 /// ... and how many times as many as do not.
 const MOST: usize = 2;
 
-/// What is seen along one side of the last squares.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
-    Sharp,
-    GoesOn,
-    Unclear,
-}
-
 /// The squares that are seen for certain.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ends {
-    /// Least and largest coordinate of their inner corners along u and v.
-    range: [[i32; 2]; 2],
+    range: Range,
     /// Whether the board ends there.
     sharp: [[bool; 2]; 2],
     /// Whether cells with an even sum are light.
@@ -49,19 +40,9 @@ impl Ends {
         let shader = Shader::of(picture, lattice)?;
         let range = trimmed(lattice)?;
         let even = even_cells(&shader, range).filter(|mean| mean.abs() >= SQUARES)?;
-        let mut ends = Self { range, sharp: [[false; 2]; 2], even_light: even > 0.0 };
-        for (axis, end) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            for _ in 1..REACH {
-                match ends.side(&shader, axis, end) {
-                    Side::GoesOn => ends.range[axis][end] += if end == 0 { -1 } else { 1 },
-                    side => {
-                        ends.sharp[axis][end] = side == Side::Sharp;
-                        break;
-                    }
-                }
-            }
-        }
-        Some(ends)
+        let even_light = even > 0.0;
+        let (range, sharp) = followed(range, |range, axis, end| side(&shader, even_light, range, axis, end));
+        Some(Self { range, sharp, even_light })
     }
 
     /// The place of the squares on the board, if there is one only.
@@ -86,44 +67,44 @@ impl Ends {
         placement.is_dark(even_cell) != self.even_light
             && [0, 1].into_iter().all(|axis| within(axis, 0) && within(axis, 1))
     }
+}
 
-    fn side(&self, shader: &Shader, axis: usize, end: usize) -> Side {
-        let ([low, high], [first, last]) = (self.range[1 - axis], self.range[axis]);
-        let at = if end == 0 { first - 1 } else { last };
-        let cell = |across: i32| if axis == 0 { (at, across) } else { (across, at) };
-        let light = |(u, v): (i32, i32)| (parity(u, v) > 0.0) == self.even_light;
-        let usual = shader.contrast();
-        let (mut sharp, mut next, mut seen) = (0, 0, 0);
-        for across in low - 1..high {
-            let (one, two) = (cell(across), cell(across + 1));
-            let Some(beside) = shader.side_px(one, axis).map(|px| (BESIDE_PX / px).clamp(BESIDE[0], BESIDE[1])) else {
-                continue;
-            };
-            // Of the light neighbour over the dark one, so far outside the end of the squares.
-            let contrast = |outside: f64| {
-                let along = if end == 0 { -outside } else { 1.0 + outside };
-                let place = if axis == 0 { [along, 0.5] } else { [0.5, along] };
-                let step = shader.brightness(one, place)? - shader.brightness(two, place)?;
-                Some(if light(one) { step } else { -step })
-            };
-            let (Some(deep), Some(inside), Some(outside)) =
-                (contrast(-3.0 * beside), contrast(-beside), contrast(beside))
-            else {
-                continue;
-            };
-            if deep.min(inside) < SEEN * usual {
-                continue;
-            }
-            seen += 1;
-            sharp += usize::from(outside.abs() < LEFT * inside && inside > UNFADED * deep);
-            next += usize::from(outside < -NEXT * inside);
+/// What is seen along one side of the last squares.
+fn side(shader: &Shader, even_light: bool, range: &Range, axis: usize, end: usize) -> Beyond {
+    let ([low, high], [first, last]) = (range[1 - axis], range[axis]);
+    let at = if end == 0 { first - 1 } else { last };
+    let cell = |across: i32| if axis == 0 { (at, across) } else { (across, at) };
+    let light = |(u, v): (i32, i32)| (parity(u, v) > 0.0) == even_light;
+    let usual = shader.contrast();
+    let (mut sharp, mut next, mut seen) = (0, 0, 0);
+    for across in low - 1..high {
+        let (one, two) = (cell(across), cell(across + 1));
+        let Some(beside) = shader.side_px(one, axis).map(|px| (BESIDE_PX / px).clamp(BESIDE[0], BESIDE[1])) else {
+            continue;
+        };
+        // Of the light neighbour over the dark one, so far outside the end of the squares.
+        let contrast = |outside: f64| {
+            let along = if end == 0 { -outside } else { 1.0 + outside };
+            let place = if axis == 0 { [along, 0.5] } else { [0.5, along] };
+            let step = shader.brightness(one, place)? - shader.brightness(two, place)?;
+            Some(if light(one) { step } else { -step })
+        };
+        let (Some(deep), Some(inside), Some(outside)) = (contrast(-3.0 * beside), contrast(-beside), contrast(beside))
+        else {
+            continue;
+        };
+        if deep.min(inside) < SEEN * usual {
+            continue;
         }
-        if sharp >= LEAST_PAIRS && sharp >= MOST * (seen - sharp) {
-            Side::Sharp
-        } else if next >= LEAST_PAIRS && next >= MOST * (seen - next) {
-            Side::GoesOn
-        } else {
-            Side::Unclear
-        }
+        seen += 1;
+        sharp += usize::from(outside.abs() < LEFT * inside && inside > UNFADED * deep);
+        next += usize::from(outside < -NEXT * inside);
+    }
+    if sharp >= LEAST_PAIRS && sharp >= MOST * (seen - sharp) {
+        Beyond::Nothing
+    } else if next >= LEAST_PAIRS && next >= MOST * (seen - next) {
+        Beyond::Squares
+    } else {
+        Beyond::Unclear
     }
 }

@@ -8,15 +8,18 @@ use super::size_seen::{Counted, end_to_end, other_size};
 use crate::error::Error;
 
 /// Lines beyond the corners that were found at which the squares are looked for.
-pub(super) const REACH: i32 = 8;
+const REACH: i32 = 8;
 /// Mean agreement with the two colours of squares of a board.
 pub(super) const SQUARES: f64 = 0.5;
 /// Share of a line that must be in view.
 const IN_VIEW: f64 = 0.5;
 
+/// Least and largest coordinate of inner corners along u and v.
+pub(super) type Range = [[i32; 2]; 2];
+
 /// What lies beyond the last corners of one side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Beyond {
+pub(super) enum Beyond {
     Squares,
     /// The board ends: paper, or what it is fixed to.
     Nothing,
@@ -27,8 +30,7 @@ enum Beyond {
 /// The part of the lattice that is a board.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BoardSeen {
-    /// Least and largest coordinate of its inner corners along u and v.
-    range: [[i32; 2]; 2],
+    range: Range,
     /// Whether it ends there in view.
     ends: [[bool; 2]; 2],
 }
@@ -39,11 +41,8 @@ impl BoardSeen {
         let shader = Shader::of(picture, lattice)?;
         let range = trimmed(lattice)?;
         let even = even_cells(&shader, range).filter(|mean| mean.abs() >= SQUARES)?.signum();
-        let mut seen = Self { range, ends: [[false; 2]; 2] };
-        for (axis, end) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            seen.follow(&shader, even, axis, end);
-        }
-        Some(seen)
+        let (range, ends) = followed(range, |range, axis, end| beyond(&shader, even, range, axis, end));
+        Some(Self { range, ends })
     }
 
     /// Inner corners along u and v, where all ends are in view.
@@ -72,43 +71,46 @@ impl BoardSeen {
         let [low, high] = self.range[axis];
         (self.ends[axis] == [true; 2]).then_some((high - low + 1).unsigned_abs())
     }
+}
 
-    /// Takes lines up to the end of the squares.
-    fn follow(&mut self, shader: &Shader, even: f64, axis: usize, end: usize) {
+/// The range with lines up to the end of the squares, and whether they end there, as `beyond(range, axis, end)` tells of each next line.
+pub(super) fn followed(mut range: Range, beyond: impl Fn(&Range, usize, usize) -> Beyond) -> (Range, [[bool; 2]; 2]) {
+    let mut ends = [[false; 2]; 2];
+    for (axis, end) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         for _ in 1..REACH {
-            match self.beyond(shader, even, axis, end) {
-                Beyond::Squares => self.range[axis][end] += if end == 0 { -1 } else { 1 },
-                Beyond::Nothing => {
-                    self.ends[axis][end] = true;
-                    return;
+            match beyond(&range, axis, end) {
+                Beyond::Squares => range[axis][end] += if end == 0 { -1 } else { 1 },
+                side => {
+                    ends[axis][end] = side == Beyond::Nothing;
+                    break;
                 }
-                Beyond::Unclear => return,
             }
         }
     }
+    (range, ends)
+}
 
-    /// The next line of cells after the squares around the last corners; `even`: shade of the cells with an even sum.
-    fn beyond(&self, shader: &Shader, even: f64, axis: usize, end: usize) -> Beyond {
-        let at = if end == 0 { self.range[axis][0] - 2 } else { self.range[axis][1] + 1 };
-        let [low, high] = self.range[1 - axis];
-        match shader.line([axis, end], at, low - 1..=high) {
-            Some((_, _, count)) if (count as f64) < IN_VIEW * f64::from(high - low + 2) => Beyond::Unclear,
-            Some((Line::Squares, alternating, _)) if even * alternating >= SQUARES => Beyond::Squares,
-            Some((Line::Paper | Line::Covered, ..)) => Beyond::Nothing,
-            _ => Beyond::Unclear,
-        }
+/// The next line of cells after the squares around the last corners; `even`: shade of the cells with an even sum.
+fn beyond(shader: &Shader, even: f64, range: &Range, axis: usize, end: usize) -> Beyond {
+    let at = if end == 0 { range[axis][0] - 2 } else { range[axis][1] + 1 };
+    let [low, high] = range[1 - axis];
+    match shader.line([axis, end], at, low - 1..=high) {
+        Some((_, _, count)) if (count as f64) < IN_VIEW * f64::from(high - low + 2) => Beyond::Unclear,
+        Some((Line::Squares, alternating, _)) if even * alternating >= SQUARES => Beyond::Squares,
+        Some((Line::Paper | Line::Covered, ..)) => Beyond::Nothing,
+        _ => Beyond::Unclear,
     }
 }
 
 /// Mean shade of the squares between the corners, those with an odd sum with the other sign.
-pub(super) fn even_cells(shader: &Shader, [[u0, u1], [v0, v1]]: [[i32; 2]; 2]) -> Option<f64> {
+pub(super) fn even_cells(shader: &Shader, [[u0, u1], [v0, v1]]: Range) -> Option<f64> {
     let cells = (v0..v1).flat_map(|v| (u0..u1).map(move |u| (u, v)));
     let seen: Vec<f64> = cells.filter_map(|(u, v)| Some(parity(u, v) * shader.at((u, v), [0.5; 2])?)).collect();
     (!seen.is_empty()).then(|| seen.iter().sum::<f64>() / seen.len() as f64)
 }
 
 /// The corners without outer lines of which less than half is there.
-pub(super) fn trimmed(lattice: &Lattice) -> Option<[[i32; 2]; 2]> {
+pub(super) fn trimmed(lattice: &Lattice) -> Option<Range> {
     let (low, high) = bounds(lattice)?;
     let mut range = [[low.0, high.0], [low.1, high.1]];
     loop {

@@ -2,7 +2,7 @@
 
 use tiny_skia::{FillRule, LineCap, Paint, PathBuilder, Pixmap, Rect, Stroke, Transform};
 
-use super::dot_font::glyph;
+use super::dot_font::{ADVANCE, dots};
 
 /// Red, green, blue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,12 +11,9 @@ pub(super) struct Colour(pub u8, pub u8, pub u8);
 /// Where nothing is drawn.
 pub(super) const GROUND: Colour = Colour(20, 20, 24);
 
-/// Dots from one letter to the next.
-const ADVANCE: f64 = 6.0;
-
 /// Width of a text, px.
 pub(super) fn text_width(text: &str, dot: f64) -> f64 {
-    (ADVANCE * text.chars().count() as f64 - 1.0) * dot
+    ((ADVANCE * text.chars().count()) as f64 - 1.0) * dot
 }
 
 /// A picture to draw on; (0, 0) is the outer corner of the top-left pixel.
@@ -94,14 +91,10 @@ impl Canvas {
     }
 
     fn dots(&mut self, at: [f64; 2], dot: f64, beyond: f64, text: &str, paint: &Paint) {
-        for (k, c) in text.chars().enumerate() {
-            for (row, bits) in glyph(c).into_iter().enumerate() {
-                for column in (0..5).filter(|c| bits >> (4 - c) & 1 == 1) {
-                    let x = at[0] + (ADVANCE * k as f64 + f64::from(column)) * dot - beyond;
-                    let y = at[1] + row as f64 * dot - beyond;
-                    self.fill([x, y], [dot + 2.0 * beyond; 2], paint);
-                }
-            }
+        for [column, row] in dots(text) {
+            let x = at[0] + column as f64 * dot - beyond;
+            let y = at[1] + row as f64 * dot - beyond;
+            self.fill([x, y], [dot + 2.0 * beyond; 2], paint);
         }
     }
 

@@ -3,13 +3,14 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::text::{csv, number};
+use super::text::number;
 use super::{Context, Offsets};
 use crate::geom::Pose;
 use crate::identify::Solution;
 use crate::model::inverse;
 use crate::model::mdh::{Mdh, Unfit};
 use crate::model::robot::Robot;
+use crate::series::to_csv;
 use crate::urdf::{Chain, JointKind};
 
 /// The robot as the files of this result describe it: offsets folded into origins, or left to the controller.
@@ -122,7 +123,7 @@ pub(super) fn mastering_csv(solution: &Solution, context: &Context) -> String {
         "# Joint offsets for the mastering (zero point) table of the controller: where it shows the angle q, the joint stands at q + offset,\n\
          # so that after the correction it has to show q + offset. Not determined (no): known only together with base, tool\n\
          # or the origins beside it, or within twice its sigma of none and that sigma beyond 0.5 mrad (0.05 mm); leave it. Without a sigma: held, not estimated.\n{note}{}",
-        csv(&rows)
+        to_csv(&rows)
     )
 }
 
@@ -182,7 +183,7 @@ pub(super) fn mdh_csv(robot: &Robot, note: &str) -> String {
         let numbers = [link.alpha_rad, link.a_m, link.theta_rad, link.d_m].map(number);
         rows.push([vec![link.joint.clone(), kind.into()], numbers.to_vec()].concat());
     }
-    out + &csv(&rows)
+    out + &to_csv(&rows)
 }
 
 #[cfg(test)]

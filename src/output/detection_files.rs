@@ -5,11 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::names::file_parts;
-use super::text::{as_written, csv, json};
+use super::text::{as_written, json};
 use crate::error::{Code, Result};
 use crate::identify::SeenImage;
 use crate::series::{
-    CirclePoint, Edge, ImageObservations, InputFile, Plate, Series, observations_csv, plate_csv, plate_toml,
+    CirclePoint, Edge, ImageObservations, InputFile, Plate, Series, observations_csv, plate_csv, plate_toml, to_csv,
 };
 
 /// Name of the file that lists all others.
@@ -121,7 +121,7 @@ fn dropped_csv(images: &[SeenImage]) -> String {
         }
         rows.push(row);
     }
-    csv(&rows)
+    to_csv(&rows)
 }
 
 #[derive(Serialize)]

@@ -1,7 +1,19 @@
 //! A dot font of 5 x 7 for text in pictures: capitals, digits and some signs.
 
+/// Dots from one character to the next.
+pub(super) const ADVANCE: usize = 6;
+
+/// Column and row of each dot of a text, from its upper left corner.
+pub(super) fn dots(text: &str) -> impl Iterator<Item = [usize; 2]> {
+    text.chars().enumerate().flat_map(|(k, c)| {
+        glyph(c).into_iter().enumerate().flat_map(move |(row, bits)| {
+            (0..5).filter(move |column| bits >> (4 - column) & 1 == 1).map(move |column| [ADVANCE * k + column, row])
+        })
+    })
+}
+
 /// Rows of a 5 x 7 glyph from the top, five bits each; unknown characters are blank.
-pub(super) fn glyph(c: char) -> [u8; 7] {
+fn glyph(c: char) -> [u8; 7] {
     match c.to_ascii_uppercase() {
         'A' => [14, 17, 17, 31, 17, 17, 17],
         'B' => [30, 17, 17, 30, 17, 17, 30],

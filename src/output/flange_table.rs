@@ -1,9 +1,10 @@
 //! at.csv: the flange at given joint vectors, with its covariance.
 
 use super::restore::FoundModel;
-use super::text::{csv, number};
+use super::text::number;
 use crate::assess::PredictedFlange;
 use crate::error::{Code, Error, Result};
+use crate::series::to_csv;
 
 /// The flange at every joint vector (rad or m, in the order of the chain).
 ///
@@ -41,5 +42,5 @@ pub fn at_csv(model: &FoundModel, readings: &[Vec<f64>], found: &[PredictedFlang
         row.extend(upper().map(|(i, j)| number(f.covariance[(i, j)])));
         rows.push(row);
     }
-    csv(&rows)
+    to_csv(&rows)
 }

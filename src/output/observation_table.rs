@@ -2,8 +2,7 @@
 
 use super::names::ImageNames;
 use super::residuals::{poses, residuals};
-use super::text::csv_line;
-use crate::series::Edge;
+use crate::series::{Edge, csv_line};
 use crate::solve::Fit;
 
 /// Name of the file.

@@ -2,11 +2,10 @@
 
 use super::gauge::Gauge;
 use super::names::{file_names, plate_name};
-use super::text::csv;
 use crate::error::Result;
 use crate::model::plate_modes::radius;
 use crate::problem::Adjustment;
-use crate::series::{Edge, plate_toml};
+use crate::series::{Edge, plate_toml, to_csv};
 
 const HEADER: [&str; 9] =
     ["id", "x_m", "y_m", "z_m", "outer_radius_m", "inner_radius_m", "sigma_x_m", "sigma_y_m", "sigma_z_m"];
@@ -41,5 +40,5 @@ fn plate_csv(Adjustment { problem, state }: &Adjustment, plate: usize, gauge: &G
         row.extend(numbers.map(|v| format!("{v:?}")));
         rows.push(row);
     }
-    csv(&rows)
+    to_csv(&rows)
 }

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use image::{GrayImage, ImageFormat};
 
-use super::dot_font::glyph;
+use super::dot_font::dots;
 use super::plate_drawing::{Caption, Figure, figures};
 use crate::error::{Code, Error, Result};
 use crate::series::Plate;
@@ -95,14 +95,10 @@ impl Canvas {
     fn text(&mut self, at: [f64; 2], height: f64, text: &str) {
         let dot = height / 7.0;
         let left = at[0] - 3.0 * dot * text.chars().count() as f64;
-        for (k, c) in text.chars().enumerate() {
-            for (row, bits) in glyph(c).into_iter().enumerate() {
-                for column in (0..5).filter(|c| bits >> (4 - c) & 1 == 1) {
-                    let x = left + (6 * k + column) as f64 * dot;
-                    let y = at[1] + (6 - row) as f64 * dot;
-                    self.fill([x, y, x + dot, y + dot], |p| p[0] >= x && p[0] < x + dot && p[1] >= y && p[1] < y + dot);
-                }
-            }
+        for [column, row] in dots(text) {
+            let x = left + column as f64 * dot;
+            let y = at[1] + (6 - row) as f64 * dot;
+            self.fill([x, y, x + dot, y + dot], |p| p[0] >= x && p[0] < x + dot && p[1] >= y && p[1] < y + dot);
         }
     }
 }

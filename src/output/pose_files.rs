@@ -4,12 +4,12 @@ use nalgebra::Matrix6;
 
 use super::gauge::Gauge;
 use super::names::{ImageNames, file_names};
-use super::text::{csv, list, quoted};
+use super::text::{list, quoted};
 use crate::fit::{FreePoses, PlacedCamera};
 use crate::geom::Pose;
 use crate::identify::Solution;
 use crate::problem::Image;
-use crate::series::CameraMount;
+use crate::series::{CameraMount, to_csv};
 
 /// Name of the covariance of all stand-alone poses together.
 pub(super) const TOGETHER: &str = "poses_covariance.npy";
@@ -129,5 +129,5 @@ pub(super) fn poses_csv(names: &ImageNames, free_poses: &FreePoses) -> String {
         row.extend(upper().map(|at| format!("{:?}", covariance[at])));
         rows.push(row);
     }
-    csv(&rows)
+    to_csv(&rows)
 }

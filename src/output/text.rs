@@ -74,20 +74,6 @@ pub(super) fn key(name: &str) -> String {
     }
 }
 
-/// Text of a table; cells are quoted where needed.
-pub(super) fn csv(rows: &[Vec<String>]) -> String {
-    rows.iter().map(|row| csv_line(row)).collect()
-}
-
-/// One line of a table.
-pub(super) fn csv_line(row: &[String]) -> String {
-    let cell = |cell: &String| match cell.contains([',', '"', '\n', '\r']) || cell.trim() != cell {
-        true => format!("\"{}\"", cell.replace('"', "\"\"")),
-        false => cell.clone(),
-    };
-    row.iter().map(cell).collect::<Vec<_>>().join(",") + "\n"
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

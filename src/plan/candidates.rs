@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
-use super::scene::{Scene, arm_length_m};
+use super::scene::Scene;
 use super::setting::Setting;
 use super::viewpoint::{ViewRange, Viewpoint};
 use super::visibility::{VisibilityLimits, seen_markers};
@@ -259,7 +259,7 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
                       plate whose markers suit the camera (robotcal plate --focal-px)";
         return Error::new(Code::PlanViewless, "plan: views", what, remedy);
     }
-    let arm = arm_length_m(&setting.robot);
+    let arm = setting.robot.chain.arm_length_m();
     let axes = setting.robot.chain.readings.len();
     if tally.out_of_reach + tally.unseen == tally.views && axes < 6 {
         let what =

@@ -81,12 +81,6 @@ pub struct Scene {
     clearance_m: f64,
 }
 
-/// Length of the arm: the sum of all origins behind the first moving joint, m.
-pub fn arm_length_m(robot: &Robot) -> f64 {
-    let joints = robot.chain.joints.iter().skip_while(|j| j.kind == JointKind::Fixed).skip(1);
-    joints.map(|j| j.origin.translation.norm()).sum()
-}
-
 /// The plate as a box in its own frame.
 fn plate_box(plate: &Plate) -> OrientedBox {
     let margin = PLATE_MARGIN * plate.pitch_m;
@@ -138,7 +132,7 @@ impl Scene {
     /// The scene of a setting.
     pub fn new(setting: &Setting, options: &SceneOptions) -> Self {
         let robot = &setting.robot;
-        let arm = arm_length_m(robot);
+        let arm = robot.chain.arm_length_m();
         let radius = options.link_radius_m.unwrap_or(RADIUS_SHARE * arm);
         let mut capsules = options.described.clone();
         capsules.extend(along_links(robot, radius, &options.described));

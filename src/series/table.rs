@@ -245,11 +245,16 @@ fn refuse_other_separators(file: &str, text: &str) -> Result<()> {
     Err(Error::new(Code::CsvSeparator, format!("{file}:1"), what, remedy))
 }
 
-/// Text of a table, quoted where needed.
-pub(super) fn to_csv(rows: &[Vec<String>]) -> String {
+/// Text of a table; cells are quoted where needed.
+pub fn to_csv(rows: &[Vec<String>]) -> String {
+    rows.iter().map(|row| csv_line(row)).collect()
+}
+
+/// One line of a table.
+pub fn csv_line(row: &[String]) -> String {
     let quoted = |cell: &String| match cell.contains([',', '"', '\n', '\r']) || cell.trim() != cell {
         true => format!("\"{}\"", cell.replace('"', "\"\"")),
         false => cell.clone(),
     };
-    rows.iter().map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n").collect()
+    row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n"
 }

@@ -38,7 +38,7 @@ pub(super) fn set_up(request: &WorldRequest, robot: &Robot, rng: &mut impl Rng) 
     let in_hand = near([0.03, -0.05, 0.08], [0.05, -0.04, 0.4], rng);
     let plate_in_hand = near([0.01, 0.02, 0.05], [0.02, -0.03, 0.3], rng);
     let mut setup = Setup { camera: in_hand, plates: Vec::new(), limits, stumps: stumps(robot) };
-    let reach = reach(robot);
+    let reach = robot.chain.arm_length_m().max(0.2);
     if request.mount == CameraMount::Fixed {
         setup.plates = vec![plate_in_hand; request.placements.max(1)];
         for plate in setup.plates.iter_mut().skip(1) {
@@ -63,12 +63,6 @@ pub(super) fn set_up(request: &WorldRequest, robot: &Robot, rng: &mut impl Rng) 
 /// A pose near the given one: 5 mm and 0.05 rad about it.
 fn near(xyz: [f64; 3], rpy: [f64; 3], rng: &mut impl Rng) -> Pose {
     Pose::from_xyz_rpy(xyz.map(|v| v + rng.random_range(-0.005..0.005)), rpy.map(|v| v + rng.random_range(-0.05..0.05)))
-}
-
-/// Length of the arm: the sum of all origins behind the first moving joint, m.
-fn reach(robot: &Robot) -> f64 {
-    let joints = robot.chain.joints.iter().skip_while(|j| j.kind == JointKind::Fixed).skip(1);
-    joints.map(|j| j.origin.translation.norm()).sum::<f64>().max(0.2)
 }
 
 /// The robot cut off behind each moving joint.

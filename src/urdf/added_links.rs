@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::elements::escaped;
 use super::patch::join;
 use super::read::{elements, parse, without_undeclared_prefixes};
 use crate::error::{Code, Error, Result};
@@ -62,9 +63,4 @@ pub fn add_links(text: &str, links: &[AddedLink]) -> Result<String> {
     let at = if text[..line].ends_with('\n') { line } else { at };
     let before = if text[..at].ends_with('\n') { "" } else { "\n" };
     Ok(format!("{}{before}{added}{}", &text[..at], &text[at..]))
-}
-
-/// A name within double quotes of XML.
-fn escaped(name: &str) -> String {
-    name.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }

@@ -140,6 +140,12 @@ impl Chain {
         self.joints.iter().take_while(|j| j.upwards).count()
     }
 
+    /// Length of the arm: the sum of all origins behind the first moving joint, m.
+    pub fn arm_length_m(&self) -> f64 {
+        let joints = self.joints.iter().skip_while(|j| j.kind == JointKind::Fixed).skip(1);
+        joints.map(|j| j.origin.translation.norm()).sum()
+    }
+
     /// True where camera and plate are both carried: the base moves, too.
     pub fn base_moves(&self) -> bool {
         self.joints.iter().any(|j| !j.states_origin())

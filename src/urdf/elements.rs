@@ -290,6 +290,11 @@ pub(super) fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, '
     node.children().find(|n| n.is_element() && n.tag_name().name() == name)
 }
 
+/// A name within double quotes of XML.
+pub(super) fn escaped(name: &str) -> String {
+    name.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+}
+
 /// Exactly `count` finite numbers separated by blanks.
 pub(super) fn numbers(text: &str, count: usize) -> Option<Vec<f64>> {
     let values: Vec<f64> = text.split_whitespace().map(|t| t.parse().ok()).collect::<Option<_>>()?;

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use roxmltree::Node;
 
+use super::elements::escaped;
 use super::read::{RobotDescription, parse};
 use crate::error::{Code, Error, Notice, Result};
 
@@ -64,10 +65,6 @@ impl RobotDescription {
 
 fn unjoined(description: &RobotDescription, what: &str) -> Error {
     Error::new(Code::UrdfSyntax, description.path.display(), what, "check the file with check_urdf")
-}
-
-fn escaped(name: &str) -> String {
-    name.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;")
 }
 
 /// Text of the links and joints of a description, their names with a prefix.

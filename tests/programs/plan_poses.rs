@@ -10,7 +10,7 @@ use robotcal::identify::RobotModel;
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::plan::candidates::CandidateOptions;
 use robotcal::plan::criterion::Criterion;
-use robotcal::plan::scene::{Capsule, Scene, SceneOptions, arm_length_m};
+use robotcal::plan::scene::{Capsule, Scene, SceneOptions};
 use robotcal::plan::setting::Setting;
 use robotcal::plan::{Budget, Choice, Demand, Plan, PlanRequest, choose, forecast, plan};
 use robotcal::series::{CameraMount, Plate, PlateKind};
@@ -27,7 +27,7 @@ fn chain(name: &str) -> Chain {
 
 fn request(name: &str, count: usize) -> PlanRequest {
     let robot = RobotModel::Rigid.robot(chain(name));
-    let arm = arm_length_m(&robot);
+    let arm = robot.chain.arm_length_m();
     let joints = robot.chain.readings.len();
     PlanRequest {
         setting: Setting {
@@ -56,7 +56,7 @@ fn request(name: &str, count: usize) -> PlanRequest {
 /// A camera on a stand that looks back at the robot, the plate on the flange in two ways.
 fn fixed_request(name: &str, count: usize) -> PlanRequest {
     let mut request = request(name, count);
-    let arm = arm_length_m(&request.setting.robot);
+    let arm = request.setting.robot.chain.arm_length_m();
     request.setting.mount = CameraMount::Fixed;
     request.setting.mounting = Pose::from_xyz_rpy([0.9 * arm, 0.05, 0.45 * arm], [-1.7, 0.05, 1.5]);
     request.setting.placements = vec![
