@@ -10,13 +10,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::WorkspacePoint;
 use super::flange::{FlangeModel, everywhere};
 use super::limits::Limits;
 use super::promise::{FlangeErrors, nominal_laid_over, usual_joint_sigma};
 use super::repeating::Repeats;
 use super::used_stops::{on_robot_sigmas, stops};
-use super::{WorkspacePoint, median};
 use crate::geom::adjoint;
+use crate::linalg::median;
 use crate::linalg::{SymmetricFactor, symmetric_eigen};
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Layout, Restraint};

@@ -4,7 +4,8 @@ use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::Limits;
 use super::points::{MeasuredPoint, PointFit, by_frame_and_reflector, fit_points};
-use super::statistics::{log_chance, median};
+use super::statistics::log_chance;
+use crate::linalg::median;
 use crate::model::robot::Robot;
 
 /// Points that miss by far more than the others.

@@ -6,7 +6,6 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::init::upper_median;
 
 /// A ratio with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -77,11 +76,6 @@ pub fn root_mean_square(units: &[(f64, f64)]) -> f64 {
     (s / w).sqrt()
 }
 
-/// Median, of an even number the larger of both; `None` of nothing.
-pub fn median(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| upper_median(values.to_vec()))
-}
-
 /// Logarithm of the probability that so many parameters explain this share of so many squares or more, of Gaussian noise; of an odd number
 /// of parameters a bound, that of one more.
 pub fn log_chance(share: f64, squares: f64, parameters: usize) -> f64 {
@@ -118,7 +112,6 @@ mod tests {
         let (few, many) = (width(20), width(320));
         assert!(many < 0.4 * few, "{few} {many}");
         assert_eq!(bootstrap_ratio(&[], &[]), None);
-        assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
     }
 
     #[test]

@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::summary::{in_words, with_remedy};
-use crate::assess::{Cause, Errors, Identifiability, UnknownDirection, median};
+use crate::assess::{Cause, Errors, Identifiability, UnknownDirection};
 use crate::error::Notice;
 use crate::identify::{Comparison, Estimator, LensEvidence};
+use crate::linalg::median;
 use crate::output::solution_json::{EstimateRecord, PlateRecord, SolutionRecord};
 use crate::output::verdict::{Trust, Verdict};
 use crate::problem::{InstrumentKind, OriginPrior, short_name};

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Detection;
 use crate::error::Code;
+use crate::linalg::median;
 use crate::series::Plate;
 
 /// Gives the markers the median of the radii that the images show, where they show any.
@@ -14,13 +15,9 @@ pub fn set_radii<'a>(plate: &mut Plate, images: impl Iterator<Item = &'a Detecti
         let all = seen.entry(*id).or_default();
         (0..2).for_each(|k| all[k].push(radii[k]));
     }
-    let middle = |values: &mut Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values[values.len() / 2]
-    };
     for marker in &mut plate.markers {
-        if let Some(radii) = seen.get_mut(&marker.id) {
-            [marker.outer_radius_m, marker.inner_radius_m] = radii.each_mut().map(middle);
+        if let Some([Some(outer), Some(inner)]) = seen.get(&marker.id).map(|radii| radii.each_ref().map(median)) {
+            [marker.outer_radius_m, marker.inner_radius_m] = [outer, inner];
         }
     }
 }

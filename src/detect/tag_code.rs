@@ -5,6 +5,7 @@ use calib_targets_aruco::Dictionary;
 use super::Picture;
 use super::quads::Quad;
 use crate::geom::PlaneMap;
+use crate::linalg::median_by;
 use crate::series::Tags;
 
 /// Share of the modules of the border that must be dark.
@@ -130,12 +131,12 @@ impl Reader {
         let within = self.border..self.border + self.bits;
         let on_border = |row: usize, column: usize| !within.contains(&row) || !within.contains(&column);
         let cells = || (0..side).flat_map(|row| (0..side).map(move |column| (row, column)));
-        let dark = middle(cells().filter(|(r, c)| on_border(*r, *c)).map(|(r, c)| all[r][c]).collect())?;
+        let dark = median_by(cells().filter(|(r, c)| on_border(*r, *c)).map(|(r, c)| all[r][c]), f32::total_cmp)?;
         let beside = (1..side).flat_map(|k| {
             let k = k as f64;
             [(k, -0.7), (k, n + 0.7), (-0.7, k), (n + 0.7, k)]
         });
-        let light = middle(beside.filter_map(|(x, y)| value(x, y)).collect())?;
+        let light = median_by(beside.filter_map(|(x, y)| value(x, y)), f32::total_cmp)?;
         if light - dark < LEAST_CONTRAST * light.abs() {
             return None;
         }
@@ -169,11 +170,6 @@ impl Reader {
 fn as_printed(quad: &Quad, turn: usize) -> Quad {
     let corner = |k: usize| quad[(turn + k) % 4];
     [corner(3), corner(2), corner(1), corner(0)]
-}
-
-fn middle(mut values: Vec<f32>) -> Option<f32> {
-    values.sort_by(f32::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// Bilinear; `None` outside the picture.

@@ -18,6 +18,7 @@ use super::tag_seen::{MEASURED, contradiction, gap_contradiction, instead};
 use super::{Detection, Dropped, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::geom::PlaneMap;
+use crate::linalg::median;
 use crate::series::{Edge, Observation, Plate, PlateKind, TagPrint, Tags};
 
 /// Sides that must say by how much ink has grown before they are believed.
@@ -242,8 +243,7 @@ impl<'a> Board<'a> {
                 }
             }
         }
-        grown.sort_by(f64::total_cmp);
-        if grown.len() < LEAST_GROWN { 0.0 } else { grown[grown.len() / 2] }
+        median(&grown).filter(|_| grown.len() >= LEAST_GROWN).unwrap_or(0.0)
     }
 
     /// What is in the picture, where the plate is not.

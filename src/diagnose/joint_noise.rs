@@ -2,9 +2,10 @@
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use super::stands_still::{StandsStill, stands_still};
-use crate::assess::{Accuracy, median};
+use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
+use crate::linalg::median;
 use crate::problem::Problem;
 use crate::urdf::JointKind;
 

@@ -1,9 +1,10 @@
 //! A camera that sits loosely on its mount: it tips over between two positions, and the joint noise shows two heaps.
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, some_of};
-use crate::assess::{Accuracy, Limits, median};
+use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
+use crate::linalg::median;
 
 /// Most images that are named.
 const MOST_IMAGES: usize = 5;

@@ -1,8 +1,9 @@
 //! Is the corrected robot known better than the nominal one misses?
 
 use super::kind::{CheckContext, Kind, Quantity, Subject};
-use crate::assess::{Accuracy, Uncertainty, median};
+use crate::assess::{Accuracy, Uncertainty};
 use crate::error::Code;
+use crate::linalg::median;
 
 /// The stops do not determine the robot.
 #[derive(Debug, Clone, PartialEq)]

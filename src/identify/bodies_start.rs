@@ -14,11 +14,12 @@ use super::points_start::{
     DISAGREES, FEWEST_POINTS, HOLD, Placed, PointAt, TRIMMINGS, agreeing_in_part, distances, once, point_at, posture,
     tip_at, usual_distance,
 };
-use crate::assess::{Limits, median};
+use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::init::{PosePair, solve_hand_eye};
 use crate::linalg::SymmetricFactor;
+use crate::linalg::median;
 use crate::problem::{Adjustment, BodyRejection, BodySeen, InstrumentKind, MeasuredSeries, Problem};
 
 /// Fills in instruments and bodies.

@@ -3,7 +3,8 @@
 use nalgebra::{Vector2, Vector3};
 
 use crate::error::{Error, Quantity};
-use crate::init::{Homography, upper_median};
+use crate::init::Homography;
+use crate::linalg::median;
 use crate::problem::{Image, Problem};
 use crate::series::Plate;
 
@@ -18,7 +19,7 @@ pub(super) fn with_counts_exchanged(error: Error, problem: &Problem, camera: usi
     }
     let exchanged = lattice(plate, (rows, columns));
     let ratio = |image: &Image| Some(misfit(image, &exchanged)? / misfit(image, &places(plate))?);
-    if upper_median(own().filter_map(ratio).collect()) >= share {
+    if median(own().filter_map(ratio)).unwrap_or(f64::INFINITY) >= share {
         return error;
     }
     let what = format!("{}; with columns and rows of plate.toml exchanged they fit a plane", error.what);

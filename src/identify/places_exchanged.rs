@@ -4,9 +4,10 @@ use nalgebra::Vector3;
 
 use super::points_start::{PointAt, agreeing, distances, each_place, point_at};
 use super::touch_mistakes::in_metres;
-use crate::assess::{Limits, median};
+use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, MistakeKind, RowsOf};
 use crate::error::{Code, Result};
+use crate::linalg::median;
 use crate::problem::{Adjustment, InstrumentKind};
 
 /// Places of which two are exchanged without taking long.

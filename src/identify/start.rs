@@ -7,14 +7,13 @@ use super::breaks::broken;
 use super::rows_of::rows_of_images;
 use super::start_verdict::{StartReached, StartVerdict};
 use super::suspects::{Suspects, best_scale, directions_alone, left_by_scale};
-use crate::assess::{Limits, median};
+use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake};
 use crate::error::{Code, Error, Quantity, Result};
 use crate::fit::FreePoses;
 use crate::geom::log_so3;
-use crate::init::{
-    HandEye, HandEyeStart, PosePair, SeenStop, Zeros, hand_eye_misfit, shah, solve_hand_eye, solve_zeros, upper_median,
-};
+use crate::init::{HandEye, HandEyeStart, PosePair, SeenStop, Zeros, hand_eye_misfit, shah, solve_hand_eye, solve_zeros};
+use crate::linalg::median;
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
 use crate::problem::{
@@ -215,7 +214,7 @@ fn closed_form(
         trial.mountings[mounting] = s.solution.camera;
         trial.placements[placement] = s.solution.plate;
         let errors = pairs.iter().map(|(i, _)| pixels(problem, &trial, *i).unwrap_or(f64::INFINITY));
-        upper_median(errors.collect())
+        median(errors).unwrap_or(f64::INFINITY)
     };
     let mut ranked: Vec<(f64, &HandEyeStart)> = starts.iter().take(COMPARED).map(|s| (cost(s), s)).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -369,7 +368,7 @@ fn check_rotations(of: &str, poses: &[PosePair], limits: &Limits) -> Result<()> 
 fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye, limits: &Limits) -> Vec<usize> {
     let mut aside = Vec::new();
     let misfits: Vec<f64> = pairs.iter().map(|(_, p)| solution.misfit(p)).collect();
-    let bound = (limits.set_aside_factor * upper_median(misfits)).max(limits.set_aside_floor);
+    let bound = (limits.set_aside_factor * median(misfits).unwrap_or(f64::INFINITY)).max(limits.set_aside_floor);
     for (i, pair) in pairs {
         if solution.misfit(pair) > bound {
             let (angle_rad, distance_m) = solution.error(pair);
@@ -389,7 +388,7 @@ fn misfit(adjustment: &Adjustment, free: &FreePoses, image: usize) -> Option<f64
 /// Median of these of the images in use.
 pub(super) fn usual_misfit(adjustment: &Adjustment, free: &FreePoses) -> Option<f64> {
     let of_used = adjustment.problem.used_on_robot().filter_map(|i| misfit(adjustment, free, i));
-    median(&of_used.collect::<Vec<f64>>())
+    median(of_used)
 }
 
 /// Takes images back that were set `aside` with the nominal robot, and fit the robot that was found as the others do. True where there are some.

@@ -9,7 +9,8 @@ use crate::assess::Limits;
 use crate::diagnose::MistakeKind;
 use crate::error::Code;
 use crate::geom::Pose;
-use crate::init::{PosePair, SeenStop, hand_eye_misfit, plate_scale, solve_hand_eye, upper_median};
+use crate::init::{PosePair, SeenStop, hand_eye_misfit, plate_scale, solve_hand_eye};
+use crate::linalg::median;
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
 use crate::series::{CameraMount, LENGTH_UNITS, spread};
@@ -204,7 +205,7 @@ impl Suspects<'_> {
 pub(super) fn directions_alone(pairs: &[PosePair], limits: &Limits) -> Option<(f64, f64)> {
     let start = solve_hand_eye(pairs).into_iter().next()?;
     let (angles, distances): (Vec<f64>, Vec<f64>) = pairs.iter().map(|p| start.solution.error(p)).unzip();
-    let (angle_rad, distance_m) = (upper_median(angles), upper_median(distances));
+    let (angle_rad, distance_m) = (median(angles).unwrap_or(f64::INFINITY), median(distances).unwrap_or(f64::INFINITY));
     (angle_rad < limits.suspicious_misfit && distance_m > limits.other_lengths_m).then_some((angle_rad, distance_m))
 }
 

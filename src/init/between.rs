@@ -7,9 +7,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
-use super::hand_eye::{PosePair, shah, upper_median};
+use super::hand_eye::{PosePair, shah};
 use crate::geom::{Pose, exp_so3, log_so3, project_to_so3};
 use crate::linalg::SymmetricFactor;
+use crate::linalg::median;
 
 /// What one image says: `X * camera_from_plate = before * V * after * Z`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,7 +87,7 @@ fn angle(t: &PoseTriple, [x, v, z]: &Rotations) -> Vector3<f64> {
 }
 
 fn median_angle(triples: &[PoseTriple], rotations: &Rotations) -> f64 {
-    upper_median(triples.iter().map(|t| angle(t, rotations).norm()).collect())
+    median(triples.iter().map(|t| angle(t, rotations).norm())).unwrap_or(f64::INFINITY)
 }
 
 /// Gauss-Newton with weights for images that disagree.
@@ -142,12 +143,12 @@ fn translated(triples: &[PoseTriple], rotations: &Rotations) -> Option<(Pose, f6
         (0..9).for_each(|k| n[(k, k)] += HELD * scale);
         solution = SymmetricFactor::new(&n).ok()?.solve(&b);
         left = equations.iter().map(|(a, y)| (a * &solution - y).norm()).collect::<Vec<f64>>();
-        let bound = 2.0 * upper_median(left.clone()) + f64::EPSILON;
+        let bound = 2.0 * median(&left).unwrap_or(f64::INFINITY) + f64::EPSILON;
         weights = left.iter().map(|l| (bound / l.max(f64::MIN_POSITIVE)).min(1.0)).collect();
     }
     let sizes = triples.iter().zip(&left).map(|(t, l)| angle(t, rotations).norm() + l).collect();
     let translation = Vector3::new(solution[3], solution[4], solution[5]);
-    Some((Pose::new(*v, translation), upper_median(sizes)))
+    Some((Pose::new(*v, translation), median(sizes).unwrap_or(f64::INFINITY)))
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::geom::{Pose, log_so3, project_to_so3};
+use crate::linalg::median;
 use crate::linalg::{SymmetricFactor, symmetric_eigen};
 use crate::model::robot::Robot;
 use crate::series::{CameraMount, spread};
@@ -67,16 +68,10 @@ impl HandEye {
         (self.camera * pair.camera_from_plate).misfit(&(pair.chain * self.plate))
     }
 
-    /// Median misfit of the images, rad plus m.
+    /// Median misfit of the images, rad plus m; infinite where there are none.
     pub fn median_error(&self, pairs: &[PosePair]) -> f64 {
-        upper_median(pairs.iter().map(|p| self.misfit(p)).collect())
+        median(pairs.iter().map(|p| self.misfit(p))).unwrap_or(f64::INFINITY)
     }
-}
-
-/// The middle value, of an even number the larger of both; infinite where there is none.
-pub fn upper_median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
 /// Median misfit of the best closed form, rad plus m; infinite where none has a solution.

@@ -9,7 +9,7 @@ mod zeros;
 
 pub use between::{PoseTriple, solve_between};
 pub use focal::{FocalCandidate, focal_candidates};
-pub use hand_eye::{HandEye, HandEyeStart, PosePair, hand_eye_misfit, plate_scale, shah, solve_hand_eye, upper_median};
+pub use hand_eye::{HandEye, HandEyeStart, PosePair, hand_eye_misfit, plate_scale, shah, solve_hand_eye};
 pub use homography::{Homography, PlanarPose};
 pub use resection::{resect, resect_near};
 pub use zeros::{SeenStop, Zeros, solve_zeros};

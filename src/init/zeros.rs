@@ -7,9 +7,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
-use super::hand_eye::{PosePair, shah, upper_median};
+use super::hand_eye::{PosePair, shah};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
 use crate::linalg::SymmetricFactor;
+use crate::linalg::median;
 use crate::model::robot::{Posture, Robot};
 use crate::series::CameraMount;
 
@@ -113,7 +114,7 @@ impl Trial<'_> {
                 break;
             }
         }
-        let left = upper_median(self.stops.iter().map(|s| size(&self.misfit(s, &x).0)).collect());
+        let left = median(self.stops.iter().map(|s| size(&self.misfit(s, &x).0))).unwrap_or(f64::INFINITY);
         Some(Zeros { offsets: x.offsets, reversed: self.reversed, left })
     }
 

@@ -1,11 +1,13 @@
-//! Dense factorisations and quadratic programmes; the only room that imports `faer` and `clarabel`.
+//! Dense factorisations, quadratic programmes and the median; the only room that imports `faer` and `clarabel`.
 //!
 //! Every call of `faer` runs on one thread and says so itself; its setting for the whole process belongs to the caller and is neither read nor
 //! changed. Parallelism lies outside, over images, stops and blocks of columns, whose bounds do not depend on the number of threads.
 
+mod median;
 mod quadratic;
 mod wide;
 
+pub use median::{median, median_by};
 pub use quadratic::{LinearRow, NotSolved, minimise_quadratic};
 pub use wide::{add_combination, sum_of_products, wide};
 

@@ -12,11 +12,12 @@ use super::solution_json::{
     ApparentShift, CameraRecord, EstimateRecord, FreePoseRecord, ImageRecord, ObservationColumns, PlateRecord,
     SeriesRecord, StatisticsRecord, StopNoise,
 };
-use crate::assess::{ProjectionMap, Uncertainty, median};
+use crate::assess::{ProjectionMap, Uncertainty};
 use crate::error::Result;
 use crate::fit::{Fit, FreePoses};
 use crate::geom::Pose;
 use crate::identify::{depths_m, stated_covariance};
+use crate::linalg::median;
 use crate::model::plate_modes;
 use crate::problem::{Image, MeasuredSeries, MeasuredStop, Problem};
 use crate::series::{Observation, Plate};

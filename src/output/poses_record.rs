@@ -5,10 +5,11 @@ use super::photogrammetry::Photogrammetry;
 use super::solution_json::{
     CameraRecord, EstimateRecord, ImageRecord, PlateRecord, ProgramRecord, SeriesRecord, StatisticsRecord,
 };
-use crate::assess::{Limits, median};
+use crate::assess::Limits;
 use crate::diagnose::Weight;
 use crate::error::Notice;
 use crate::identify::{PoseComparison, PoseSigma, StartVerdict};
+use crate::linalg::median;
 use crate::series::InputFile;
 
 /// Name of the record that a program reads.

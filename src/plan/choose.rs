@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::error::{Code, Error, Result};
 use crate::linalg::LinearRow;
+use crate::linalg::median;
 use crate::plan::candidates::{Candidate, CandidateCounts, CandidateOptions, Search, candidates, workspace};
 use crate::plan::criterion::Criterion;
 use crate::plan::information::{Identified, candidate_information, flange_weight, stop_information};
@@ -283,13 +284,8 @@ fn rows(budget: &Budget, pool: &[Candidate], drawn: usize, placements: usize) ->
     }
     if let Some(travel) = budget.travel_rad {
         let joints = pool.first().map_or(0, |c| c.readings.len());
-        let middle: Vec<f64> = (0..joints)
-            .map(|j| {
-                let mut all: Vec<f64> = pool[..drawn].iter().map(|c| c.readings[j]).collect();
-                all.sort_by(f64::total_cmp);
-                all[all.len() / 2]
-            })
-            .collect();
+        let middle: Vec<f64> =
+            (0..joints).map(|j| median(pool[..drawn].iter().map(|c| c.readings[j])).unwrap_or(0.0)).collect();
         group(f64::NEG_INFINITY, travel, &|c| crate::plan::order::motion(&c.readings, &middle));
     }
     rows

@@ -1,5 +1,6 @@
 //! Rejection with reasons: single observations by their residual, whole images by the joint error that they would need.
 
+use crate::linalg::median;
 use crate::problem::{
     Adjustment, BodyMeasurement, BodyRejection, Image, ImageRejection, Mismatch, ObservationRejection, TakenFrom,
     Weighting, predict,
@@ -117,9 +118,8 @@ fn reject_worst(adjustment: &mut Adjustment) -> Option<Taken> {
     let noise: Vec<(Taken, &[f64])> = noise.iter().map(|(i, dq)| (*i, dq.as_slice())).collect();
     let sigma: Vec<f64> = (0..joints)
         .map(|r| {
-            let mut sizes: Vec<f64> = noise.iter().map(|(_, dq)| dq[r].abs()).collect();
-            sizes.sort_by(f64::total_cmp);
-            (1.4826 * sizes[sizes.len() / 2]).max(IMAGE_SIGMA_FLOOR)
+            let usual = median(noise.iter().map(|(_, dq)| dq[r].abs())).unwrap_or(0.0);
+            (1.4826 * usual).max(IMAGE_SIGMA_FLOOR)
         })
         .collect();
     let score = |dq: &[f64]| (dq.iter().zip(&sigma).map(|(q, s)| (q / s).powi(2)).sum::<f64>() / joints as f64).sqrt();

@@ -4,10 +4,11 @@
 use rayon::prelude::*;
 
 use super::simulated::measured;
-use crate::assess::{Limits, Ratio, bootstrap_ratio, median, root_mean_square};
+use crate::assess::{Limits, Ratio, bootstrap_ratio, root_mean_square};
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, adjoint};
 use crate::identify::{Estimator, PoseStage, RobotModel, TruthError, build, estimate_all, truth_error};
+use crate::linalg::median;
 use crate::problem::{Adjustment, TakenFrom, Tie};
 use crate::series::{Plate, PlateKind};
 use crate::simulate::{SimulatedSeries, WorldRequest, series};

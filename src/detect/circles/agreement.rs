@@ -12,9 +12,9 @@ use std::sync::LazyLock;
 use super::asymmetry::Drift;
 use super::lattice::Cell;
 use super::local_map::LocalMap;
-use super::measure::median;
 use super::types::InnerOuter;
 use crate::geom::PlaneMap;
+use crate::linalg::median;
 
 /// A measured marker: where on the plate (cells), radii in units of the pitch, centroids in the image.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +38,7 @@ pub(super) struct Inner {
 pub(super) fn agreement(markers: &[Seen], size: [usize; 2]) -> (Vec<bool>, Option<InnerOuter>) {
     let Some(map) = Map::of(markers) else { return (vec![true; markers.len()], None) };
     let differences: Vec<Option<Difference>> = markers.iter().map(|m| map.difference(m)).collect();
-    let mean = |a: usize| median(differences.iter().flatten().map(|d| d.value[a]).collect());
+    let mean = |a: usize| median(differences.iter().flatten().map(|d| d.value[a])).unwrap_or(0.0);
     let common = if differences.iter().flatten().count() >= 5 { [mean(0), mean(1)] } else { [0.0; 2] };
     let agrees = |d: &Difference| (0..2).all(|a| (d.value[a] - common[a]).abs() < 5.0 * d.sigma[a] + d.slack);
     let good: Vec<bool> = differences.iter().map(|d| d.as_ref().is_none_or(agrees)).collect();

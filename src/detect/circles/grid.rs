@@ -26,6 +26,7 @@ use super::types::{CircleDetection, Options, Outcome, Reason};
 use crate::detect::size_seen::{Counted, beyond, other_rows, other_size};
 use crate::detect::{Detection, Outline, Picture, Sizes};
 use crate::error::{Code, Error, Notice, Result};
+use crate::linalg::median;
 use crate::series::{Marker, Plate};
 
 /// How far a marker may be from its place on the lattice, in steps.
@@ -291,17 +292,13 @@ impl<'a> Grid<'a> {
 
     /// The dots are of the size that is stated, where one is.
     fn agrees(&self, dots: &Dots) -> bool {
-        let mut stated: Vec<f64> = self.plate.markers.iter().map(|m| m.outer_radius_m / self.step_m).collect();
-        stated.sort_by(f64::total_cmp);
-        let usual = stated[stated.len() / 2];
-        usual <= 0.0 || (dots.usual.radius / usual).ln().abs() < RADIUS_OFF
+        let usual = median(self.plate.markers.iter().map(|m| m.outer_radius_m / self.step_m));
+        usual.is_none_or(|usual| usual <= 0.0 || (dots.usual.radius / usual).ln().abs() < RADIUS_OFF)
     }
 
     /// Whether dots that are not as most are stand at these rows and columns, none of which are those of the plate.
     fn contradicts(&self, plate: &Plate, seen: &[(i32, i32)]) -> bool {
-        let mut radii: Vec<f64> = plate.markers.iter().map(|m| m.outer_radius_m).collect();
-        radii.sort_by(f64::total_cmp);
-        let usual = radii[radii.len() / 2];
+        let Some(usual) = median(plate.markers.iter().map(|m| m.outer_radius_m)) else { return false };
         let others = self.cells.iter().zip(&plate.markers).filter(|(_, m)| (m.outer_radius_m - usual).abs() > 1e-9);
         let stated: BTreeSet<(i32, i32)> = others.map(|(&(column, row), _)| (row, column)).collect();
         !stated.is_empty() && !seen.is_empty() && !seen.iter().any(|place| stated.contains(place))

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::candidate::Candidate;
 use super::lattice::{Cell, Lattice};
+use crate::linalg::median;
 
 /// Least gap between the sizes of two kinds of dots, as a logarithm: printed sizes differ by a half or more, and a fifth is
 /// what threshold and blur may do to a small dot beside a large one.
@@ -42,8 +43,8 @@ impl Dots {
         let alike: Vec<Dot> = all.values().filter(|d| (d.ratio > 0.0) == open).copied().collect();
         let [low, high] = around_the_median(alike.iter().map(|d| d.radius).collect())?;
         let is_usual = |d: &Dot| (d.ratio > 0.0) == open && (low..=high).contains(&d.radius);
-        let median = |pick: fn(&Dot) -> f64| middle(alike.iter().filter(|d| is_usual(d)).map(pick).collect());
-        let usual = Dot { radius: median(|d| d.radius)?, ratio: median(|d| d.ratio)? };
+        let middle = |pick: fn(&Dot) -> f64| median(alike.iter().filter(|d| is_usual(d)).map(pick));
+        let usual = Dot { radius: middle(|d| d.radius)?, ratio: middle(|d| d.ratio)? };
         let other: BTreeMap<Cell, Dot> = all.into_iter().filter(|(_, d)| !is_usual(d)).collect();
         ((other.len() as f64) < FEW * lattice.cells.len() as f64).then_some(Self { usual, other })
     }
@@ -53,11 +54,6 @@ impl Dots {
         let usual = self.usual.radius;
         self.other.extend(dots.into_iter().filter(|(_, d)| (d.radius / usual).ln().abs() > MISSING));
     }
-}
-
-fn middle(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// Least and largest of the values that no gap parts from their median.

@@ -4,9 +4,9 @@ use super::candidate::Candidate;
 use super::grid_dots::Dot;
 use super::grid_place::Laid;
 use super::lattice::{Cell, Lattice};
-use super::measure::median;
 use super::neighbour_check::{Board, Placed, neighbourhood};
 use crate::detect::Picture;
+use crate::linalg::median;
 
 /// Rays from the middle of a dot; how many of them must end in the picture, and how far they go, in usual radii.
 const RAYS: usize = 24;
@@ -28,10 +28,10 @@ pub(super) fn missing_dots(
     let placed =
         |(cell, site): (&Cell, &super::lattice::Site)| (*cell, Placed { candidate: site.candidate, class: None });
     let board: Board = lattice.cells.iter().map(placed).collect();
-    let level = |pick: fn(&Candidate) -> f32| {
-        median(lattice.cells.values().map(|s| f64::from(pick(&candidates[s.candidate]))).collect())
-    };
-    let threshold = 0.5 * (level(|c| c.paper) + level(|c| c.ink));
+    let level =
+        |pick: fn(&Candidate) -> f32| median(lattice.cells.values().map(|s| f64::from(pick(&candidates[s.candidate]))));
+    let (Some(paper), Some(ink)) = (level(|c| c.paper), level(|c| c.ink)) else { return Vec::new() };
+    let threshold = 0.5 * (paper + ink);
     let dot = |cell: Cell| {
         let usual_image = neighbourhood(&board, cell, candidates)?.0.ellipse(usual.radius)?;
         let along = |k: usize| {
@@ -39,8 +39,8 @@ pub(super) fn missing_dots(
             edge(|relative| at(picture, usual_image.point(angle, relative)), threshold as f32)
         };
         let edges: Vec<f64> = (0..RAYS).filter_map(along).collect();
-        let told = edges.len() >= LEAST_RAYS;
-        told.then(|| (cell, Dot { radius: usual.radius * median(edges), ratio: 0.0 }))
+        let middle = median(&edges).filter(|_| edges.len() >= LEAST_RAYS)?;
+        Some((cell, Dot { radius: usual.radius * middle, ratio: 0.0 }))
     };
     unseen(lattice, laid, cells).into_iter().filter_map(dot).collect()
 }

@@ -8,6 +8,7 @@ use super::levels::Levels;
 use super::refine::{Fit, Start, refine};
 use super::types::{DroppedCandidate, Measured, Options, Reason};
 use crate::detect::Picture;
+use crate::linalg::median;
 
 /// Threshold between the envelopes: a little above the middle, where small blurred markers keep their size.
 pub(super) const THRESHOLD: f32 = 0.55;
@@ -79,13 +80,12 @@ pub(super) fn learn(
         let learners = targets.iter().step_by(stride);
         let (started, fits): (Vec<&Target>, Vec<Fit>) =
             learners.filter_map(|t| Some((t, refine(picture, &t.start(&camera, 0.7), pixels).ok()?))).unzip();
-        if fits.is_empty() {
-            return camera;
-        }
         let size = |e: &Ellipse| e.semi_axes().iter().sum::<f64>() / 2.0;
         let beside = started.iter().zip(&fits).map(|(t, f)| size(&f.measured.outer.ellipse) - size(&t.ellipse));
-        beside_px = median(beside.collect());
-        let blur = median(fits.iter().map(|f| f.measured.blur_px).collect());
+        let (Some(beside), Some(blur)) = (median(beside), median(fits.iter().map(|f| f.measured.blur_px))) else {
+            return camera;
+        };
+        beside_px = beside;
         let settled = (blur / camera.blur_px).ln().abs() < 0.15;
         let noise = [0, 1].map(|side| plain_variance(&fits, side).unwrap_or(variance));
         camera = Camera { blur_px: blur, noise, ink_slope: ink_slope(&fits) };
@@ -114,18 +114,9 @@ pub(super) fn ink_slope(fits: &[Fit]) -> f64 {
 
 /// Median over markers of the mean square residual on one side of the edge.
 fn plain_variance(fits: &[Fit], side: usize) -> Option<f64> {
-    let values: Vec<f64> =
-        fits.iter().map(|f| f.plain[side]).filter(|(_, n)| *n >= 12.0).map(|(sum, n)| sum / n).collect();
+    let values = fits.iter().map(|f| f.plain[side]).filter(|(_, n)| *n >= 12.0).map(|(sum, n)| sum / n);
     // the levels and gradients of a side take about two degrees of freedom from some hundred pixels: 2 %
-    (!values.is_empty()).then(|| (1.02 * median(values)).max(1.0 / 12.0))
-}
-
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    median(values).map(|middle| (1.02 * middle).max(1.0 / 12.0))
 }
 
 /// Measures every candidate of a picture without asking which marker it is.
@@ -139,7 +130,7 @@ pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Drop
     let clear = |i: usize| clear_of(i, &candidates, &index);
     let mut targets: Vec<Target> = candidates.iter().enumerate().map(|(i, c)| target_of(c, None, clear(i))).collect();
     let mut pixels = Pixels::default();
-    let guess = median(candidates.iter().map(|c| c.blur_px).collect());
+    let guess = median(candidates.iter().map(|c| c.blur_px)).unwrap_or(f64::NAN);
     let camera = learn(picture, &mut targets, guess, levels.noise, &mut pixels);
     let mut measured = Vec::new();
     for target in &targets {

@@ -7,13 +7,14 @@
 
 use super::edge_model::Pixels;
 use super::levels::noise_of;
-use super::measure::{Camera, INK_SLOPE, ink_slope, median};
+use super::measure::{Camera, INK_SLOPE, ink_slope};
 use super::nearby_ink::NearbyInk;
 use super::predicted::{Predicted, Surroundings};
 use super::refine::Fit;
 use super::rescue::{CROWDED, WITHIN_REACH};
 use super::types::Measured;
 use crate::detect::Picture;
+use crate::linalg::median;
 
 /// Most rounds, and the movement of the centres from one to the next at which they rest, px.
 const ROUNDS: usize = 20;
@@ -93,8 +94,8 @@ impl<'a> Overlapping<'a> {
                     moved = moved.max(self.measure(k));
                 }
             }
-            let blur_px = median(self.fits.iter().flatten().map(|f| f.measured.blur_px).collect());
-            if learn && blur_px.is_finite() {
+            let blur_px = median(self.fits.iter().flatten().map(|f| f.measured.blur_px));
+            if let Some(blur_px) = blur_px.filter(|blur| learn && blur.is_finite()) {
                 self.camera.blur_px = blur_px;
                 let around = |k: usize| Neighbours::of(self.known + k, &self.believed, blur_px);
                 self.neighbours = (0..self.predicted.len()).map(around).collect();

@@ -10,7 +10,7 @@ use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
 use super::lattice::{Apart, Buckets, Cell, Lattice, lattices};
 use super::levels::Levels;
-use super::measure::{Camera, THRESHOLD, Target, drop_target, learn, median, target_of};
+use super::measure::{Camera, THRESHOLD, Target, drop_target, learn, target_of};
 use super::neighbour_check::{Board, Placed, around, check_neighbours, continuation, neighbourhood};
 use super::predicted::Predicted;
 use super::refine::{Fit, refine};
@@ -18,6 +18,7 @@ use super::rescue::{Figure, Place, rescue};
 use super::types::{CircleDetection, DroppedCandidate, Found, InnerOuter, Options, Outcome, Reason};
 use crate::detect::Picture;
 use crate::error::{Code, Error, Result};
+use crate::linalg::median;
 use crate::series::Plate;
 
 /// Smallest lattice that is worth a try; below it chance cannot be excluded.
@@ -281,7 +282,7 @@ impl Work<'_> {
         options: &Options,
         dropped: &mut Vec<DroppedCandidate>,
     ) -> Harvest {
-        let guess = median(board.values().map(|p| self.candidates[p.candidate].blur_px).collect());
+        let guess = median(board.values().map(|p| self.candidates[p.candidate].blur_px)).unwrap_or(f64::NAN);
         let mut targets: Vec<Target> = board.iter().map(|(cell, p)| self.target(*cell, p, guess)).collect();
         let camera = learn(self.picture, &mut targets, guess, levels.noise, &mut self.pixels);
         let (mut entries, mut refused) = (Vec::new(), Vec::new());
@@ -416,7 +417,7 @@ impl Work<'_> {
             .collect();
         found.sort_by_key(|f| f.marker);
         let observations = found.iter().flat_map(Found::observations).collect();
-        let blur_px = median(found.iter().map(|f| f.measured.blur_px).collect());
+        let blur_px = median(found.iter().map(|f| f.measured.blur_px)).unwrap_or(f64::NAN);
         let noise = harvest.camera.noise.map(f64::sqrt);
         let skew = |e: &Entry| {
             let (sum, information) = e.fit.skew;

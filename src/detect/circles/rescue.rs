@@ -12,11 +12,12 @@ use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
 use super::lattice::Cell;
 use super::local_map::LocalMap;
-use super::measure::{Camera, Target, median};
+use super::measure::{Camera, Target};
 use super::nearby_ink::NearbyInk;
 use super::refine::{Fit, Start, WHOLE, refine};
 use super::types::Measured;
 use crate::detect::Picture;
+use crate::linalg::median;
 
 /// A circle or annulus of the plate: outer radius in units of the pitch, inner over outer radius.
 #[derive(Debug, Clone, Copy)]
@@ -154,9 +155,8 @@ impl<F: Fn(Cell) -> Option<Figure>> Around<'_, F> {
             }
             (None, Ok(_)) => return None,
         };
-        let blurs = self.near(cell, 2).map(|(_, f)| f.measured.blur_px).collect();
-        let blur_px = median(blurs);
-        let camera = if blur_px.is_finite() { Camera { blur_px, ..*camera } } else { *camera };
+        let blur_px = median(self.near(cell, 2).map(|(_, f)| f.measured.blur_px)).filter(|blur| blur.is_finite());
+        let camera = blur_px.map_or(*camera, |blur_px| Camera { blur_px, ..*camera });
         Some(base.start(&camera, 0.1))
     }
 

@@ -10,6 +10,7 @@ use super::refusal::Refusal;
 use super::smooth::Source;
 use crate::detect::Picture;
 use crate::detect::board_labels::Lattice;
+use crate::linalg::median;
 
 /// Corners that say how the edges look, at most.
 const SAMPLES: usize = 12;
@@ -94,7 +95,7 @@ fn is_steep(corner: &Saddle) -> bool {
 
 /// What most fits with a halo show. One of no halo may have come out as one of -1, whose edge has the blur of the halo.
 fn usual(fits: &[Saddle]) -> Look {
-    let middle = |of: &dyn Fn(&Saddle) -> f64| quantile(fits.iter().map(of), 0.5);
+    let middle = |of: &dyn Fn(&Saddle) -> f64| median(fits.iter().map(of));
     let halo = middle(&|s| s.halo).is_some_and(|halo| halo > LEAST_HALO);
     let blur_px = middle(&|s| if halo { s.blur_px } else { s.steepness_px()[0] });
     Look { blur_px: blur_px.unwrap_or(START.blur_px), halo }

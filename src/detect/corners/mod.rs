@@ -27,6 +27,7 @@ use rim::out_of_line;
 
 use super::board_labels::{Lattice, Placement};
 use super::{Detection, Dropped, Picture};
+use crate::linalg::median;
 use crate::series::{Edge, Observation};
 
 /// Share of full scale from which a pixel is clipped.
@@ -172,8 +173,8 @@ impl<'a> Usual<'a> {
     fn of(picture: &'a Picture, fitted: &BTreeMap<(i32, i32), Saddle>) -> Self {
         Self {
             picture,
-            contrast: median(fitted.values().map(|s| s.contrast.abs())),
-            residual: median(fitted.values().map(|s| s.noise / s.contrast.abs())),
+            contrast: median(fitted.values().map(|s| s.contrast.abs())).unwrap_or(0.0),
+            residual: median(fitted.values().map(|s| s.noise / s.contrast.abs())).unwrap_or(0.0),
         }
     }
 
@@ -199,8 +200,4 @@ fn is_washed_out(picture: &Picture, saddle: &Saddle) -> bool {
     let around = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
     let clipped = |&(x, y): &(usize, usize)| x >= picture.width || y >= picture.height || picture.at(x, y) >= level;
     around.iter().all(clipped) || saddle.dark_share_from(f64::from(level)) > WASHED_OUT
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    quantile(values, 0.5).unwrap_or(0.0)
 }

@@ -7,6 +7,7 @@ use super::maps;
 use super::svg::{Anchor, Svg};
 use super::words::{count, data, significant};
 use crate::assess::{Cause, UnknownDirection};
+use crate::linalg::median;
 use crate::output::solution_json::SolutionRecord;
 
 /// Most correlations that are listed.
@@ -93,15 +94,14 @@ pub(super) fn workspace(r: &SolutionRecord) -> Markup {
     if r.workspace.is_empty() {
         return html! {};
     }
-    let mut inside: Vec<f64> = r.workspace.iter().filter(|w| w.covered).map(|w| 1e3 * w.sigma_m).collect();
-    inside.sort_by(f64::total_cmp);
+    let inside = median(r.workspace.iter().filter(|w| w.covered).map(|w| 1e3 * w.sigma_m));
     let bounds = bounds(r);
     html! {
         p {
             "Uncertainty of the position of the flange relative to " (r.flange_is_relative_to()) ", one sigma over all three axes, by the calibrated model. "
             "Joint noise of a single move comes on top. "
-            @if let Some(median) = inside.get(inside.len() / 2) {
-                "In the region of the stops it is typically " b { (significant(*median)) " mm" } "; "
+            @if let Some(sigma_mm) = inside {
+                "In the region of the stops it is typically " b { (significant(sigma_mm)) " mm" } "; "
                 "outside of it the model extrapolates."
             } @else {
                 "No sampled place lies in the region of the stops."

@@ -13,6 +13,7 @@ use super::options::{Clock, RecordingOptions};
 use super::order::{Written, twice};
 use super::parts::{Parts, parts_of};
 use crate::error::{Code, Error, Notice, Result, plain_name};
+use crate::linalg::median_by;
 use crate::series::InputFile;
 
 /// Some joints at one time.
@@ -356,22 +357,22 @@ impl Scan {
     /// Median time from stamp to recording over some topics, s.
     pub fn delay_s(&self, topics: &[String]) -> f64 {
         let all = topics.iter().filter_map(|topic| self.topics.get(topic));
-        median_s(all.flat_map(|topic| topic.delays_ns.iter().map(|(_, delay)| *delay)).collect())
+        median_s(all.flat_map(|topic| topic.delays_ns.iter().map(|(_, delay)| *delay)))
     }
 
     /// By how much more the time from stamp to recording is over the last quarter of the messages of a topic than over the first, s.
     pub fn delay_growth_s(&self, topic: &str) -> f64 {
         let mut delays = self.topics.get(topic).map_or(Vec::new(), |topic| topic.delays_ns.clone());
         delays.sort_by_key(|(log_ns, _)| *log_ns);
-        let of = |some: &[(i64, i64)]| median_s(some.iter().map(|(_, delay)| *delay).collect());
+        let of = |some: &[(i64, i64)]| median_s(some.iter().map(|(_, delay)| *delay));
         let quarter = delays.len() / 4;
         of(&delays[delays.len() - quarter..]) - of(&delays[..quarter])
     }
 }
 
-fn median_s(mut times_ns: Vec<i64>) -> f64 {
-    times_ns.sort_unstable();
-    times_ns.get(times_ns.len() / 2).map_or(0.0, |ns| *ns as f64 * 1e-9)
+/// Median of times in ns, s; 0 where there are none.
+fn median_s(times_ns: impl Iterator<Item = i64>) -> f64 {
+    median_by(times_ns, i64::cmp).map_or(0.0, |ns| ns as f64 * 1e-9)
 }
 
 #[cfg(test)]
