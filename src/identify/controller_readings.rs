@@ -1,15 +1,15 @@
 //! Poses of a controller to readings of a chain: in closed form where its joints are the coordinates of a pose, else by inverse kinematics
 //! of the nominal robot.
 
-use std::f64::consts::TAU;
-
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
 use rayon::prelude::*;
 
 use crate::error::{Code, Error, Notice, Quantity, Result};
 use crate::geom::Pose;
-use crate::model::inverse::{random_readings, reading_limits, solve_from};
+use crate::model::inverse::{
+    self, FARTHEST_STATED_RAD, FullTurns, POSTURE_STARTS, random_readings, reading_limits, solve_from,
+};
 use crate::model::robot::Robot;
 use crate::problem::MeasuredStop;
 use crate::series::{ControllerPoses, LENGTH_UNITS, LengthUnit, ReadOtherwise, Series};
@@ -17,14 +17,8 @@ use crate::urdf::{Chain, JointKind};
 
 /// Coordinates of a pose.
 const POSE_COORDINATES: usize = 6;
-/// Random starts from which a posture is looked for.
-const STARTS: usize = 200;
 /// Postures of an arm of six joints that reach a pose, at most (E. Primrose 1986).
 const MOST_POSTURES: usize = 15;
-/// Readings that are nearer are the same, rad or m.
-const SAME: f64 = 1e-3;
-/// Angles that are stated for a posture are nearer than this, rad: another posture is farther.
-const FARTHEST_STATED_RAD: f64 = 0.5;
 /// Poses that tell whether the poses of a series can be reached.
 const TRIED: usize = 8;
 
@@ -225,11 +219,9 @@ impl Arm {
     /// The same posture by full turns as near to some readings as the limits allow.
     fn turned(&self, mut readings: Vec<f64>, near: &[f64]) -> Vec<f64> {
         let kinds = &self.robot.chain.reading_kinds;
-        for ((q, near), ((low, high), kind)) in readings.iter_mut().zip(near).zip(self.limits.iter().zip(kinds)) {
-            let turned = *q + TAU * ((near - *q) / TAU).round();
-            if *kind != JointKind::Prismatic && (*low..=*high).contains(&turned) {
-                *q = turned;
-            }
+        let all = readings.iter_mut().zip(near).zip(self.limits.iter().zip(kinds));
+        for ((q, near), (limits, _)) in all.filter(|(_, (_, kind))| is_angle(**kind)) {
+            *q = inverse::turned(*q, *near, *limits, &[]);
         }
         readings
     }
@@ -252,25 +244,19 @@ impl Arm {
     fn postures_of(&self, pose: &Pose) -> Vec<Vec<f64>> {
         let mut rng = SmallRng::seed_from_u64(0);
         let start = |_| random_readings(&self.limits, &self.robot.chain.reading_kinds, &mut rng);
-        let starts: Vec<Vec<f64>> = (0..STARTS).map(start).collect();
+        let starts: Vec<Vec<f64>> = (0..POSTURE_STARTS).map(start).collect();
         starts.iter().filter_map(|s| solve_from(&self.robot, &self.limits, pose, s)).collect()
     }
 
     /// Other postures that reach the pose of some readings; none where they are without number.
     fn others(&self, pose: &Pose, readings: &[f64]) -> Vec<Vec<f64>> {
         let kinds = &self.robot.chain.reading_kinds;
-        let off = |a: f64, b: f64, kind: JointKind| match kind {
-            JointKind::Prismatic => (a - b).abs(),
-            _ => (a - b - TAU * ((a - b) / TAU).round()).abs(),
-        };
-        let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).zip(kinds).any(|((a, b), kind)| off(*a, *b, *kind) > SAME);
-        let mut all: Vec<Vec<f64>> = Vec::new();
+        let mut all = vec![readings.to_vec()];
         for found in self.postures_of(pose).into_iter().map(|q| self.turned(q, readings)) {
-            if apart(&found, readings) && all.iter().all(|other| apart(&found, other)) {
-                all.push(found);
-            }
+            FullTurns::Alike.add(found, &mut all, kinds);
         }
-        if all.len() > MOST_POSTURES { Vec::new() } else { all }
+        let others = all.split_off(1);
+        if others.len() > MOST_POSTURES { Vec::new() } else { others }
     }
 
     /// Whether most of the poses can be reached.

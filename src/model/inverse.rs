@@ -3,6 +3,8 @@
 //! From starts all over the joint ranges the iteration ends in every configuration of the arm (elbow, wrist flips, the
 //! redundant axis of a seven-axis arm); none is preferred.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Matrix6, Vector6};
 use rand::{Rng, RngExt};
 
@@ -18,6 +20,48 @@ const LONGEST_STEP: f64 = 0.5;
 const TOLERANCE: f64 = 1e-9;
 /// Range of a joint that the URDF does not limit, rad.
 const UNLIMITED: (f64, f64) = (-std::f64::consts::PI, std::f64::consts::PI);
+
+/// Random starts from which all postures of a pose are looked for; those of a six-axis arm are found several times by then.
+pub const POSTURE_STARTS: usize = 200;
+/// Readings that differ by less are the same, rad or m.
+pub const SAME_READING: f64 = 1e-3;
+/// Angles that are stated for a posture are nearer than this to it, rad: another posture is farther.
+pub const FARTHEST_STATED_RAD: f64 = 0.5;
+
+/// Whether readings that a full turn parts are of two postures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FullTurns {
+    /// They are.
+    Apart,
+    /// They are not.
+    Alike,
+}
+
+impl FullTurns {
+    /// Whether two sets of readings are of two postures.
+    fn apart(self, a: &[f64], b: &[f64], kinds: &[JointKind]) -> bool {
+        let off = |((a, b), kind): ((&f64, &f64), &JointKind)| match (self, kind) {
+            (Self::Alike, JointKind::Revolute | JointKind::Fixed) => (a - b - TAU * ((a - b) / TAU).round()).abs(),
+            _ => (a - b).abs(),
+        };
+        a.iter().zip(b).zip(kinds).map(off).any(|off| off > SAME_READING)
+    }
+
+    /// Adds a posture to others, unless it is one of them.
+    pub fn add(self, found: Vec<f64>, all: &mut Vec<Vec<f64>>, kinds: &[JointKind]) {
+        if all.iter().all(|other| self.apart(&found, other, kinds)) {
+            all.push(found);
+        }
+    }
+}
+
+/// An angle by full turns as near to another one as the limits allow, rad; `beyond`: by how many turns more or less it may be where the nearest
+/// lies outside, in this order.
+pub fn turned(angle: f64, near: f64, (low, high): (f64, f64), beyond: &[f64]) -> f64 {
+    let nearest = angle + TAU * ((near - angle) / TAU).round();
+    let beside = beyond.iter().map(|turns| nearest + TAU * turns);
+    std::iter::once(nearest).chain(beside).find(|v| (low..=high).contains(v)).unwrap_or(angle)
+}
 
 /// Lower and upper limit of every reading that the URDF limits, rad or m.
 ///

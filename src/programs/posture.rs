@@ -10,15 +10,11 @@ use super::codes::{Branch, Codes};
 use super::program::{MeantPosture, PoseTarget, Understood};
 use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
-use crate::model::inverse::{self, Reach};
+use crate::model::inverse::{self, FARTHEST_STATED_RAD, FullTurns, POSTURE_STARTS, Reach, SAME_READING};
 use crate::model::robot::{Posture as At, Robot};
 use crate::urdf::JointKind;
 
-/// Random starts for the joints of a pose that no earlier target is near to.
-const STARTS: usize = 200;
-/// Joints that are stated beside a pose are nearer than this to those that reach it, rad.
-const FARTHEST_STATED_RAD: f64 = 0.5;
-/// Seed of these starts.
+/// Seed of the random starts for the joints of a pose that no earlier target is near to.
 const SEED: u64 = 5;
 /// A solution in which no joint is further (rad or m) from where the robot comes is of the same posture.
 const NEAR: f64 = 0.5;
@@ -34,8 +30,6 @@ const AMBIGUOUS: f64 = 1.25;
 const SINGULAR: f64 = 1e-3;
 /// Places between two postures at which the sign of the Jacobian's determinant is looked at.
 const BETWEEN: usize = 40;
-/// Joints of two solutions that differ by less are the same, rad or m.
-const SAME: f64 = 1e-3;
 
 /// How the posture of a pose became known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,7 +100,7 @@ fn farthest(a: &[f64], b: &[f64]) -> f64 {
 
 /// True for joints (rad or m) of one posture and turn.
 pub(super) fn same_posture(a: &[f64], b: &[f64]) -> bool {
-    farthest(a, b) < SAME
+    farthest(a, b) < SAME_READING
 }
 
 /// Motion of the tip by the readings that are free.
@@ -151,7 +145,7 @@ fn by_either(coded: Understood<Posture>, way: Understood<Posture>) -> Understood
     let remedy = "(--nearest-posture heeds no confdata)";
     let unknown = |why: &str| Err(Why::new(LeftReason::PostureUnknown, format!("{open} {why} {remedy}")));
     match (coded, way) {
-        (Ok(coded), Ok((near, _))) if farthest(&coded.0, &near) < SAME => Ok(coded),
+        (Ok(coded), Ok((near, _))) if farthest(&coded.0, &near) < SAME_READING => Ok(coded),
         (Ok(_), Ok(_)) => unknown("mean another one than the way there"),
         (Ok(_), Err(_)) => unknown("may not count"),
         (Err(_), way) => way,
@@ -161,7 +155,7 @@ fn by_either(coded: Understood<Posture>, way: Understood<Posture>) -> Understood
 /// The way there must not lead to another posture than that of codes which count for nothing on it.
 fn by_way(coded: Understood<Posture>, way: Option<Vec<f64>>, codes: &Codes) -> Understood<Posture> {
     match (coded, way) {
-        (Ok((coded, _)), Some(way)) if farthest(&coded, &way) > SAME => {
+        (Ok((coded, _)), Some(way)) if farthest(&coded, &way) > SAME_READING => {
             let words = format!(
                 "its posture is not known: the way there leads to another one than {}, which no path of the tool heeds (--nearest-posture heeds no codes)",
                 codes.shown()
@@ -360,23 +354,21 @@ impl<'a> Finder<'a> {
         held: &[bool],
         codes: (&Codes, &[usize; 6]),
     ) -> Option<Vec<f64>> {
-        (0..STARTS).find_map(|_| {
+        (0..POSTURE_STARTS).find_map(|_| {
             let start = self.random_start(near, held);
             self.solved(wanted, &start, near, held, Some(codes))
         })
     }
 
-    /// All postures that random starts find, the nearest to `near` first. A six-axis arm has eight, found several times by then.
+    /// All postures that random starts find, the nearest to `near` first.
     fn postures(&mut self, wanted: &Pose, near: &[f64], held: &[bool]) -> Vec<Vec<f64>> {
         let mut all: Vec<Vec<f64>> = Vec::new();
-        for k in 0..STARTS {
+        for k in 0..POSTURE_STARTS {
             let start = if k == 0 { near.to_vec() } else { self.random_start(near, held) };
-            if let Some(q) = self.solved(wanted, &start, near, held, None)
-                && all.iter().all(|other| farthest(other, &q) > SAME)
-            {
-                all.push(q);
+            if let Some(q) = self.solved(wanted, &start, near, held, None) {
+                FullTurns::Apart.add(q, &mut all, &self.robot.chain.reading_kinds);
             }
-            if k >= STARTS / 4 && !all.is_empty() {
+            if k >= POSTURE_STARTS / 4 && !all.is_empty() {
                 break;
             }
         }
@@ -386,15 +378,8 @@ impl<'a> Finder<'a> {
 
     /// Whole turns of revolute joints that bring `q` nearer to `near` within the limits.
     fn turned_towards(&self, q: &[f64], near: &[f64], held: &[bool]) -> Vec<f64> {
-        let turn = std::f64::consts::TAU;
-        let one = |i: usize| {
-            if held[i] || self.robot.chain.reading_kinds[i] != JointKind::Revolute {
-                return q[i];
-            }
-            let wished = q[i] + turn * ((near[i] - q[i]) / turn).round();
-            let (low, high) = self.limits[i];
-            [wished, wished - turn, wished + turn].into_iter().find(|v| (low..=high).contains(v)).unwrap_or(q[i])
-        };
+        let turns = |i: usize| !held[i] && self.robot.chain.reading_kinds[i] == JointKind::Revolute;
+        let one = |i: usize| if turns(i) { inverse::turned(q[i], near[i], self.limits[i], &[-1.0, 1.0]) } else { q[i] };
         (0..q.len()).map(one).collect()
     }
 }
