@@ -10,13 +10,12 @@ use super::charuco_seen::{Seen, ids, instead};
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
 use super::corners::{Window, measure};
+use super::shared::KEEP_OFF_PX;
 use super::sizes::{best_of_sizes, on_picture};
 use super::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;
 
-/// Blur of a marker's border that the window of a corner stays clear of, px.
-const KEEP_OFF_PX: f64 = 2.0;
 /// Markers that must be read where the dictionary is not stated, or where an outer line is not seen.
 const LEAST_MARKERS: usize = 4;
 /// Markers of the last row that prove a row below it.

@@ -16,6 +16,7 @@ use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
 
 use super::Picture;
 use super::circles::normal_tail;
+use super::shared::{SATURATED, SYSTEMATIC_PX};
 
 /// Parameters: o, a, c, ln s, h0, h1, d0, d1, d2.
 const PARAMETERS: usize = 9;
@@ -44,10 +45,6 @@ const FARTHEST: f64 = 0.1;
 const FARTHEST_PX: f64 = 3.0;
 /// Residuals above this share of the contrast are another structure.
 const WORST: f64 = 0.12;
-/// What print and lens leave beyond noise, px per axis; as for the corners of chessboards.
-const SYSTEMATIC_PX: f64 = 0.015;
-/// A pixel at this part of the range or above counts as saturated.
-const SATURATED: f32 = 0.995;
 
 /// Where a side is looked for.
 #[derive(Debug, Clone, Copy)]

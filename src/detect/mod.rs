@@ -25,6 +25,7 @@ mod picture;
 pub mod puzzleboard;
 mod quads;
 mod run;
+mod shared;
 mod size_seen;
 mod sizes;
 mod tag_code;

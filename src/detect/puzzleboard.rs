@@ -15,6 +15,7 @@ use super::chessboard::{WINDOW, board_size};
 use super::circles::{FALSE_ALARMS, binomial_tail};
 use super::corner_finder::find_corners;
 use super::corners::{Window, measure};
+use super::shared::KEEP_OFF_PX;
 use super::sizes::{best_of_sizes, on_picture};
 use super::{Detection, Dropped, Picture};
 use crate::error::{Code, Error, Result};
@@ -22,8 +23,6 @@ use crate::series::{Next, Plate, Puzzle};
 
 /// A board elsewhere on the pattern is only named: more places, and a looser limit on chance.
 const FALSE_NAMES: f64 = 1e-3;
-/// Blur of a dot that the window of a corner stays clear of, px.
-const KEEP_OFF_PX: f64 = 2.0;
 /// Squares around a corner whose dots must agree with its place.
 const AROUND: i32 = 2;
 /// Share of these dots that may be read wrongly: a corner at another place has half of them wrong.

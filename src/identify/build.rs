@@ -13,8 +13,8 @@ use crate::model::camera::Camera;
 use crate::model::plate_modes::DOT_GAIN;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
-    Adjustment, DISPLACEMENT_SIZES, Family, Image, ImageRejection, Layout, Mark, MarkerObservation, MeasuredSeries,
-    MeasuredStop, Names, Noise, PlateShape, Problem, State, Stop, Tie, intern, release_measured_scales,
+    Adjustment, DISPLACEMENT_SIZES, Family, HUBER, Image, ImageRejection, Layout, Mark, MarkerObservation,
+    MeasuredSeries, MeasuredStop, Names, Noise, PlateShape, Problem, State, Stop, Tie, intern, release_measured_scales,
 };
 use crate::series::{Edge, Observation, Plate};
 
@@ -26,9 +26,6 @@ pub(super) const FIRST_JOINT_NOISE: f64 = 3e-3;
 
 /// First guess of the apparent displacement of the plate in an image: from above, rad or m.
 const FIRST_DISPLACEMENT: f64 = 1e-3;
-
-/// Huber bound: the 95 % point of the length of a 2-D standard normal vector.
-const HUBER: f64 = 2.45;
 
 /// The problem at a state whose poses and focal lengths are still unknown (identities; pinhole of one image width).
 ///

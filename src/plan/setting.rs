@@ -9,12 +9,10 @@ use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
-    Adjustment, Image, Layout, Mark, MarkerObservation, Names, Noise, PlateShape, Problem, State, Stop, Tie, predict,
+    Adjustment, HUBER, Image, Layout, Mark, MarkerObservation, Names, Noise, PlateShape, Problem, State, Stop, Tie,
+    predict,
 };
 use crate::series::{CameraMount, Edge, Marker, Plate};
-
-/// Huber bound of planned images; predictions have no residuals, so that it never acts.
-const HUBER: f64 = 2.45;
 
 /// Robot, camera and plates as far as they are known.
 #[derive(Debug, Clone)]
@@ -94,6 +92,7 @@ impl Setting {
             noise: Noise { pixel_factor: vec![1.0], joint: vec![joint], ..Noise::default() },
             families: Vec::new(),
             restraint: None,
+            // Predictions have no residuals, so that it never acts.
             huber: HUBER,
         };
         Adjustment { problem, state }

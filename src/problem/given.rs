@@ -52,6 +52,9 @@ pub struct Problem {
     pub huber: f64,
 }
 
+/// Huber bound on the normalised length of a residual of an image: the 95 % point of the length of a 2-D standard normal vector.
+pub const HUBER: f64 = 2.45;
+
 /// What was measured of bodies, out of its problem.
 #[derive(Debug)]
 pub struct TakenBodies(Vec<BodyMeasurement>, Vec<MeasuredLength>);

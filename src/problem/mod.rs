@@ -37,7 +37,7 @@ pub use body::{
 pub use condensed::{SeenAtStop, by_columns, condensed};
 pub use equations::{E, Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use family::Family;
-pub use given::{Problem, TakenBodies};
+pub use given::{HUBER, Problem, TakenBodies};
 pub use image::Image;
 pub use layout::{Column, Layout, Names, OriginPrior};
 pub use length::{Length, LengthEnds, MeasuredLength};

@@ -348,7 +348,7 @@ mod tests {
     #[test]
     fn huber_loses_three_percent_of_the_variance_at_its_usual_bound() {
         // Rayleigh quadrature of the same quantity.
-        let k = 2.45;
+        let k = crate::problem::HUBER;
         let n = 200_000;
         let h = 12.0 / f64::from(n);
         let (mut full, mut weighted) = (0.0, 0.0);

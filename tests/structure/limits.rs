@@ -96,7 +96,6 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/build.rs DEFAULT_SIGMA_PX", "first guess; its size is estimated"),
     ("identify/build.rs FIRST_JOINT_NOISE", "first guess"),
     ("identify/build.rs FIRST_DISPLACEMENT", "first guess"),
-    ("identify/build.rs HUBER", "loss function of the solver"),
     ("identify/computed_postures.rs DESCENDED", "starts of a search"),
     ("identify/computed_postures.rs HELD", "rounding"),
     ("identify/computed_postures.rs JOINT_SIGMA", "noise of a comparison"),

@@ -13,8 +13,8 @@
 
 use std::f64::consts::TAU;
 
-use super::refine::SATURATED;
 use super::types::{CircleDetection, DroppedCandidate, Found, Measured, Reason};
+use crate::detect::shared::SATURATED;
 
 /// Dots around one, to all sides of it.
 const AROUND: usize = 8;

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::candidate::Candidate;
 use super::lattice::{Cell, Lattice, Site};
+use crate::detect::shared::{LEAST_IN_VIEW, MISSING};
 use crate::detect::{Outline, Picture};
 
 /// Share of its dots that a grid must show to count as one, and share of the lattice that must belong to it: letters beside it may, too.
@@ -11,9 +12,6 @@ const FILLED: f64 = 0.9;
 const OF_LATTICE: f64 = 0.7;
 /// Share of a line that must be there, or in view.
 const MOST: f64 = 0.5;
-/// A line of which a smaller share of the dots in view is found is missing, where so many are in view.
-const MISSING: f64 = 0.3;
-const LEAST_IN_VIEW: usize = 3;
 
 /// Lines of dots one way and the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,6 +8,7 @@ use super::nearby_ink::{NearbyInk, lift};
 use super::squares::Squares;
 use super::types::{Imaged, Measured, Reason};
 use crate::detect::Picture;
+use crate::detect::shared::{GLARE_SLOPE, SATURATED};
 use crate::series::Edge;
 
 /// Where to start and what to assume.
@@ -82,13 +83,9 @@ pub(super) const WHOLE: f64 = 0.98;
 /// Part of a predicted third harmonic to which it is good.
 const THIRD_PART: f64 = 0.25;
 const ITERATIONS: usize = 14;
-/// A pixel at this part of the range or above counts as saturated.
-pub(super) const SATURATED: f32 = 0.995;
 
-/// A gradient of the ink that exceeds its prior sigma by this factor may be that of glare ...
+/// A gradient of the ink that exceeds its prior sigma by this factor may be that of glare, which is steep.
 const STRAINED: f64 = 5.0;
-/// ... which is steep: glare of full scale and 40 px changes by this part of the contrast per px.
-const GLARE_SLOPE: f64 = 0.02;
 /// Glare adds the same to ink and paper; their gradients agree to this part.
 const ADDED: f64 = 0.5;
 

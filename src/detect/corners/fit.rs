@@ -7,6 +7,7 @@ use super::model::{
 use super::refusal::Refusal;
 use super::smooth::Source;
 use super::sums::{RunningSums, Sum};
+use crate::detect::shared::GLARE_SLOPE;
 use crate::linalg::wide;
 
 const MAX_STEPS: usize = 30;
@@ -21,8 +22,6 @@ const NEARLY_WHOLE: f64 = 0.8;
 const START_NOISE: f64 = 0.03;
 /// Prior sigma of the slope of the light, share of the contrast per px.
 const SLOPE_PER_PX: f64 = 0.0003;
-/// The same in glare: that of full scale and 40 px changes by this share per px.
-const GLARE_SLOPE: f64 = 0.02;
 /// A slope this many times further from its prior than it and the noise explain may be that of glare ...
 const STRAINED: f64 = 4.0;
 /// ... if it is steeper than this share of the contrast per px: print and rough edges of real boards look like 0.0094 and less.

@@ -23,11 +23,8 @@ use super::fit::{Saddle, Term};
 use super::model::PARAMETERS;
 use super::raster::{LAGS, NONE, OddPart, REACH, Raster, SIDE};
 use super::small_windows::{Seen, unfollowed};
+use crate::detect::shared::SYSTEMATIC_PX;
 use crate::linalg::{add_combination, sum_of_products, wide};
-
-/// What print, lens and blur of other shapes leave beyond the noise, px per axis; seen on real boards after their
-/// printing errors are taken out.
-const SYSTEMATIC_PX: f64 = 0.015;
 
 /// Where a fit follows more than this share of noise that reaches over all lags, its residuals say nothing about it.
 const MOST_FOLLOWED: f64 = 0.6;

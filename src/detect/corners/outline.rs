@@ -5,12 +5,9 @@ use std::collections::BTreeMap;
 use super::fit::{LEAST_MARGIN_PX, Saddle};
 use super::neighbours::{FAR_REACH, seed};
 use crate::detect::board_labels::{Lattice, Placement};
+use crate::detect::shared::{LEAST_IN_VIEW, MISSING};
 use crate::detect::{Outline, Picture};
 
-/// A line of which a smaller share of the corners in view is found is missing ...
-const MISSING: f64 = 0.3;
-/// ... where this many corners of it are in view.
-const LEAST_IN_VIEW: usize = 3;
 /// A line of which this share of all corners is found is there.
 const THERE: f64 = 0.5;
 
