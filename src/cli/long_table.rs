@@ -8,6 +8,7 @@ use crate::assess::{Cause, Errors, Identifiability, UnknownDirection};
 use crate::error::Notice;
 use crate::identify::{Comparison, Estimator, LensEvidence};
 use crate::linalg::median;
+use crate::output::parameter_words::{self, grouped};
 use crate::output::solution_json::{EstimateRecord, PlateRecord, SolutionRecord};
 use crate::output::verdict::{Trust, Verdict};
 use crate::problem::{InstrumentKind, OriginPrior, short_name};
@@ -18,9 +19,6 @@ const MOST_LINES: usize = 12;
 
 /// Most lines of advice of one kind: the table stays short, the report has them all.
 const MOST_ADVICE: usize = 3;
-
-/// Most parameters of a direction that are named.
-const MOST_NAMED: usize = 4;
 
 /// The table: what was read, what was left out and why, joint noise, accuracy, what could not be determined, verdict.
 pub(super) fn text(record: &SolutionRecord) -> String {
@@ -369,7 +367,7 @@ fn map(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
 fn undetermined(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let Some(found) = &r.identifiability else { return Ok(()) };
     writeln!(out, "frames    {}", unobservable(found))?;
-    let weak: Vec<String> = r.undetermined().iter().map(|e| short_name(&e.name)).collect();
+    let weak: Vec<&str> = r.undetermined().iter().map(|e| e.name.as_str()).collect();
     if weak.is_empty() {
         return writeln!(out, "unknown   nothing else: the data determine every robot parameter");
     }
@@ -378,7 +376,7 @@ fn undetermined(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         "unknown   {} of {} robot parameters stay near nominal, the data say little of them: {}",
         weak.len(),
         r.robot_parameters().count(),
-        grouped(&weak)
+        grouped(weak.iter().copied()).join(", ")
     )
 }
 
@@ -445,31 +443,14 @@ fn identifiability(out: &mut String, found: &Identifiability, who: &str, most: u
     )
 }
 
-/// Parameters of a direction in words.
+/// Parameters of a direction in words, and why the data do not tell it.
 fn direction(d: &UnknownDirection) -> String {
-    let names: Vec<&str> = d.parameters.iter().take(MOST_NAMED).map(|(name, _)| name.as_str()).collect();
-    let rest = d.parameters.len().saturating_sub(MOST_NAMED);
-    let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
-    let what = match d.cause {
+    let why = match d.cause {
         Cause::Base => " (unobservable beside the target pose)",
         Cause::Tip => " (unobservable beside the hand-eye transform)",
         Cause::Redundant => " (do the same to this robot)",
         Cause::Idle => " (does nothing to this robot)",
         Cause::Stops => "",
     };
-    format!("{}{more}{what}", names.join(" with "))
-}
-
-/// `joint_1.origin.x`, `joint_1.origin.y` -> `joint_1.origin (x y)`.
-fn grouped(names: &[String]) -> String {
-    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
-    for name in names {
-        let (block, component) = name.rsplit_once('.').unwrap_or((name, ""));
-        match groups.last_mut().filter(|(b, _)| *b == block) {
-            Some((_, components)) => components.push(component),
-            None => groups.push((block, vec![component])),
-        }
-    }
-    let parts: Vec<String> = groups.iter().map(|(b, c)| format!("{b} ({})", c.join(" "))).collect();
-    parts.join(", ")
+    parameter_words::direction(d) + why
 }

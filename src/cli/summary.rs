@@ -8,6 +8,7 @@ use super::paragraph::{WIDTH, indented, paragraph};
 use crate::assess::Advice;
 use crate::diagnose::Subject;
 use crate::error::Code;
+use crate::output::parameter_words::MOST_NEXT;
 use crate::output::solution_json::SolutionRecord;
 use crate::output::verdict::{Trust, Verdict, VerdictReason};
 use crate::output::{ALONE, CALIBRATED};
@@ -15,9 +16,6 @@ use crate::urdf::JointKind;
 
 /// Most lines in all.
 const MOST_LINES: usize = 12;
-
-/// Most lines of what to do next.
-const MOST_NEXT: usize = 3;
 
 /// Most lines of why the result asks for a look.
 const MOST_DOUBTS: usize = 4;

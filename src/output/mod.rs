@@ -33,6 +33,7 @@ mod npy;
 mod observation_table;
 #[cfg(feature = "draw")]
 pub mod overlay;
+pub mod parameter_words;
 pub mod photogrammetry;
 pub mod plan_files;
 pub mod plan_programs;

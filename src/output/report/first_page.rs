@@ -4,12 +4,10 @@ use maud::{Markup, html};
 
 use super::findings::remedy;
 use super::words::{count, significant};
+use crate::output::parameter_words::MOST_NEXT;
 use crate::output::solution_json::{SolutionRecord, StatisticsRecord};
 use crate::output::verdict::{Trust, Verdict};
 use crate::output::{ALONE, CALIBRATED};
-
-/// Most stops that are proposed.
-const MOST_NEXT: usize = 3;
 
 /// The first page.
 pub(super) fn first_page(r: &SolutionRecord) -> Markup {

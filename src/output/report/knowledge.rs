@@ -8,13 +8,11 @@ use super::svg::{Anchor, Svg};
 use super::words::{count, data, significant};
 use crate::assess::{Cause, UnknownDirection};
 use crate::linalg::median;
+use crate::output::parameter_words::direction;
 use crate::output::solution_json::SolutionRecord;
 
 /// Most correlations that are listed.
 const MOST_PAIRS: usize = 20;
-
-/// Most parameters of a direction that are named.
-const MOST_NAMED: usize = 5;
 
 /// Rank, directions that stay unknown, observability indices, what to measure next.
 pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
@@ -34,7 +32,7 @@ pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
         }
         @if of(&[Cause::Stops]).next().is_some() {
             h3 { "What other stops could tell" }
-            ul { @for d in of(&[Cause::Stops]) { li { (names(d)) @if let Some(remedy) = &d.remedy { ": " (remedy) } } } }
+            ul { @for d in of(&[Cause::Stops]) { li { (direction(d)) @if let Some(remedy) = &d.remedy { ": " (remedy) } } } }
         }
         h3 { "What is unobservable, and does no harm" }
         p.note { "These directions change nothing that is measured, or only what target pose and hand-eye transform take up as well." }
@@ -75,14 +73,8 @@ pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
     }
 }
 
-fn names(d: &UnknownDirection) -> String {
-    let named: Vec<&str> = d.parameters.iter().take(MOST_NAMED).map(|(name, _)| name.as_str()).collect();
-    let rest = d.parameters.len().saturating_sub(MOST_NAMED);
-    named.join(" with ") + &if rest > 0 { format!(" and {rest} more") } else { String::new() }
-}
-
 fn group<'a>(what: &str, directions: impl Iterator<Item = &'a UnknownDirection>) -> Markup {
-    let all: Vec<String> = directions.map(names).collect();
+    let all: Vec<String> = directions.map(direction).collect();
     html! { @if !all.is_empty() { li { (what) ": " (all.join("; ")) } } }
 }
 

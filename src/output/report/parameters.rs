@@ -6,8 +6,9 @@ use maud::{Markup, html};
 
 use super::figure::figure;
 use super::maps;
-use super::words::{fixed, grouped, is_local, parameter, plus_minus, short, significant, split, unit};
+use super::words::{fixed, is_local, parameter, plus_minus, short, significant, unit};
 use crate::geom::Pose;
+use crate::output::parameter_words::{grouped, split};
 use crate::output::photogrammetry::Photogrammetry;
 use crate::output::solution_json::{EstimateRecord, PlacedRecord, SolutionRecord};
 use crate::series::CameraMount;

@@ -1,20 +1,12 @@
 //! Names and numbers for people.
 
+use crate::output::parameter_words::{LOCAL, split};
 use crate::output::solution_json::{EstimateRecord, SolutionRecord};
-
-/// Block and component of a parameter's name; the component of a local error has a point of its own (`local_0.3298`).
-pub(super) fn split(name: &str) -> (&str, &str) {
-    let local = name.find(LOCAL).map(|at| (&name[..at], &name[at + 1..]));
-    local.or_else(|| name.rsplit_once('.')).unwrap_or((name, ""))
-}
 
 /// True for the local error of a joint near a reading: noise of the series, no property of the robot.
 pub(super) fn is_local(name: &str) -> bool {
     name.starts_with("robot/") && name.contains(LOCAL)
 }
-
-/// What the component of a local error begins with, with the point before it.
-const LOCAL: &str = ".local_";
 
 /// Name of a parameter in words: `robot/joint_3/origin.rx` -> "joint_3 origin, rotation about x".
 pub(super) fn parameter(name: &str) -> String {
@@ -54,30 +46,6 @@ fn component_words(component: &str) -> String {
             _ => component.to_owned(),
         },
     }
-}
-
-/// Parameters by block: "joint_1 origin (x, y, rz)".
-pub(super) fn grouped<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
-    for name in names {
-        let (block, component) = split(name);
-        match groups.iter_mut().find(|(b, _)| *b == block) {
-            Some((_, components)) => components.push(component),
-            None => groups.push((block, vec![component])),
-        }
-    }
-    let words = |block: &str| match block.strip_prefix("plate_shape") {
-        Some(plate) => format!("plate{}", plate.replace('/', " of ")),
-        None => short_block(block),
-    };
-    let components = |c: &[&str]| c.iter().map(|c| short(c)).collect::<Vec<_>>().join(", ");
-    groups.iter().map(|(block, c)| format!("{}: {}", words(block), components(c))).collect()
-}
-
-/// Name of a block of the robot.
-fn short_block(block: &str) -> String {
-    let name = block.trim_start_matches("robot/");
-    name.strip_suffix("/origin").map_or_else(|| name.to_owned(), |joint| format!("{joint} origin"))
 }
 
 /// Short name of a component, for heads of tables and lists: `cos_2` -> "cos 2q".
@@ -200,8 +168,6 @@ mod tests {
         ] {
             assert_eq!(parameter(name), words);
         }
-        let names = ["robot/a/origin.x", "robot/a/origin.rz", "robot/a.gear", "robot/a.cos_2", "plate_shape.bow_xx"];
-        assert_eq!(grouped(names.into_iter()), ["a origin: x, rz", "a: gear, cos 2q", "plate: bow xx"]);
     }
 
     #[test]
