@@ -14,7 +14,7 @@
 //! | [`init`], [`solve`] | starting values; the solver |
 //! | [`fit`], [`assess`] | an adjustment at its optimum; what it is worth |
 //! | [`plan`], [`programs`] | plate design, pose planning; program text -> targets -> program text for the real robot |
-//! | [`simulate`], [`diagnose`] | a world with known truth; what the data contradict |
+//! | [`simulate`], [`diagnose`], [`frames`] | a world with known truth; what the data contradict; touches -> tool and work object |
 //! | [`identify`] | series -> solution |
 //! | [`output`] | solution -> bytes |
 //! | [`calibration`] | the front door: robot and series -> calibration |

@@ -50,9 +50,9 @@ pub enum Pattern {
 }
 
 impl Pattern {
-    /// Those of a camera.
+    /// Those of a camera; the compiler does not ask for a new one here.
     const OF_CAMERA: [Self; 4] = [Self::ThinPrism, Self::Radial, Self::Parallax, Self::Field];
-    /// Those of a plate that are columns.
+    /// Those of a plate that are columns; likewise.
     const OF_PLATE: [Self; 2] = [Self::PlateBow, Self::PlatePrint];
 
     /// The formula that has its columns.

@@ -47,6 +47,24 @@ enum Part {
     Identity,
 }
 
+/// A picture beside the report, by its name.
+type Drawn = (String, Vec<u8>);
+
+impl Part {
+    /// Its section of the report, and pictures beside it where they are asked for.
+    fn run(self, args: &StudyArgs, overlay: bool) -> Result<(Section, Vec<Drawn>)> {
+        Ok(match self {
+            Self::Precision => (precision_section(&run_precision(args.seed)), Vec::new()),
+            Self::Bias => (bias_section(&run_bias()?), Vec::new()),
+            Self::Identity => {
+                let study = run_identity(args)?;
+                let drawn = if overlay { failed_views(&study)? } else { Vec::new() };
+                (identity_section(&study), drawn)
+            }
+        })
+    }
+}
+
 /// Pictures of failed views that are drawn.
 const DRAWN: usize = 20;
 
@@ -64,19 +82,10 @@ pub(super) fn run(args: &StudyArgs, out: &Path, overlay: bool) -> Result<Verdict
     let place = ResultFolder::among(out)?;
     let mut sections = Vec::new();
     let mut pictures = Vec::new();
-    let wants = |part: Part| args.part.is_empty() || args.part.contains(&part);
-    if wants(Part::Precision) {
-        sections.push(precision_section(&run_precision(args.seed)));
-    }
-    if wants(Part::Bias) {
-        sections.push(bias_section(&run_bias()?));
-    }
-    if wants(Part::Identity) {
-        let study = run_identity(args)?;
-        if overlay {
-            pictures = failed_views(&study)?;
-        }
-        sections.push(identity_section(&study));
+    for part in Part::value_variants().iter().filter(|part| args.part.is_empty() || args.part.contains(part)) {
+        let (section, drawn) = part.run(args, overlay)?;
+        sections.push(section);
+        pictures.extend(drawn);
     }
     let mut files = image_study_files(&sections, &command(args));
     files.extend(pictures);
@@ -136,7 +145,7 @@ fn run_identity(args: &StudyArgs) -> Result<Identity> {
 }
 
 /// Overlays of the failed views; of the only one in any case.
-fn failed_views(study: &Identity) -> Result<Vec<(String, Vec<u8>)>> {
+fn failed_views(study: &Identity) -> Result<Vec<Drawn>> {
     let only = study.views.len() == 1;
     let plates = Plates::standard()?;
     let missed = |v: &&crate::study::image_stage::IdentityView| only || v.failed() || v.found < v.visible;

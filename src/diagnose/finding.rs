@@ -39,7 +39,8 @@ use crate::error::{Code, Error, Notice};
 
 macro_rules! findings {
     ($($kind:ident,)+) => {
-        /// One finding. A new kind is a file in this folder, its name in the list below, and a row in [`super::CHECKS`].
+        /// One finding. A new kind is a file in this folder, its name in the list below, and a row in
+        /// [`super::CHECKS`], unless it is found elsewhere (the head of [`super`] names those that are).
         #[derive(Debug, Clone, PartialEq)]
         #[allow(missing_docs)] // Each variant is named after its type, which says what it is.
         pub enum Finding {

@@ -2,6 +2,10 @@
 //!
 //! To add one: a file with a function of the stage at which it runs and a type that is a `Kind`; the type as a variant of
 //! [`Finding`]; the function as a row of [`CHECKS`]. Numbers that decide stand in [`crate::assess::Limits`].
+//!
+//! Some kinds are found before there is a fit to check, or where a way is chosen, and have no row: [`Mistake`], [`ComputedPostures`],
+//! [`ToolInPoses`] and [`LensNotInRos`] by `identify`, [`Mistake`] in touches of a tool by `frames` of the command line, too; [`Noticed`] is a
+//! notice that was given on the way.
 
 mod agreement;
 mod camera_model;

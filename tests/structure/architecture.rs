@@ -8,7 +8,7 @@ use std::process::Command;
 use crate::imports::{files_below, rooms};
 
 /// Rooms from the bottom up; rooms on one level are peers and do not import each other, but for the pairs in `PEERS`.
-const LEVELS: [&[&str]; 16] = [
+pub const LEVELS: [&[&str]; 16] = [
     &["error", "stage"],
     &["files", "geom", "linalg"],
     &["series", "urdf"],

@@ -9,4 +9,5 @@ mod codes;
 mod features;
 mod imports;
 mod limits;
+mod pages;
 mod sentences;

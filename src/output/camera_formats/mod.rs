@@ -1,6 +1,6 @@
 //! Camera models in the files of other programs: read, and written by name.
 //!
-//! To add a format: a file in this folder, a row in [`CameraFormat`]; the compiler names what is missing. A lens that a format cannot
+//! To add a format: a file in this folder, a variant of [`CameraFormat`] and its place in `ALL`, which is not asked for; the compiler names what else is missing. A lens that a format cannot
 //! express is refused with what its nearest model there loses, or written as that model where this is asked for.
 
 mod distortion;
@@ -36,7 +36,7 @@ pub enum CameraFormat {
 }
 
 impl CameraFormat {
-    /// All of them.
+    /// All of them; the compiler does not ask for a new one here.
     pub const ALL: [Self; 4] = [Self::OpenCv, Self::Kalibr, Self::Mrcal, Self::Ros];
 
     /// Name on the command line.

@@ -1,0 +1,60 @@
+//! The maps of the code and of the manual name what is there.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::architecture::LEVELS;
+
+fn src() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> {
+    fs::read_dir(folder).unwrap().map(|e| e.unwrap().path())
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap().to_string_lossy().into_owned()
+}
+
+/// Rooms in the order of the table in lib.rs: what stands in the first column.
+fn in_the_table() -> Vec<String> {
+    let text = fs::read_to_string(src().join("lib.rs")).unwrap();
+    let rows = text.lines().filter_map(|l| l.strip_prefix("//! | [`")?.split('|').next());
+    rows.flat_map(|row| row.split(['`', '[', ']', ',', ' ']).filter(|p| !p.is_empty()).map(str::to_owned)).collect()
+}
+
+#[test]
+fn every_room_has_a_level_and_a_row_in_the_table() {
+    let outside = ["lib", "main", "guide"];
+    let there: BTreeSet<String> =
+        entries(&src()).map(|p| stem(&p)).filter(|s| !outside.contains(&s.as_str())).collect();
+    let levels: BTreeSet<String> = LEVELS.iter().flat_map(|rooms| rooms.iter().map(|r| (*r).to_owned())).collect();
+    let table = in_the_table();
+    assert!(there.len() > 20, "only {} rooms", there.len());
+    assert_eq!(there, levels, "folders of src against LEVELS of architecture.rs");
+    assert_eq!(there, table.iter().cloned().collect(), "folders of src against the table of lib.rs");
+    assert_eq!(table.len(), there.len(), "a room stands twice in the table: {table:?}");
+    let level = |room: &String| LEVELS.iter().position(|rooms| rooms.contains(&room.as_str()));
+    assert!(table.iter().map(level).is_sorted(), "the table of lib.rs does not go upwards: {table:?}");
+}
+
+#[test]
+fn every_page_is_linked_and_a_module() {
+    let guide = src().join("guide");
+    let read = |name: &str| fs::read_to_string(guide.join(name)).unwrap();
+    let (index, modules) = (read("README.md"), read("mod.rs"));
+    let pages: Vec<String> = entries(&guide)
+        .filter(|p| p.extension().is_some_and(|e| e == "md"))
+        .map(|p| p.file_name().unwrap().to_string_lossy().into_owned())
+        .filter(|name| name != "README.md")
+        .collect();
+    assert!(pages.len() > 20, "only {} pages", pages.len());
+    let unlinked: Vec<&String> = pages.iter().filter(|p| !index.contains(&format!("]({p})"))).collect();
+    assert!(unlinked.is_empty(), "no link in README.md of the guide: {unlinked:?}");
+    // Its pictures are files beside it.
+    let is_module = |p: &&String| *p == "pictures.md" || modules.contains(&format!("include_str!(\"{p}\")"));
+    let missing: Vec<&String> = pages.iter().filter(|p| !is_module(p)).collect();
+    assert!(missing.is_empty(), "no module of the guide: {missing:?}");
+}
