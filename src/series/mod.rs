@@ -10,7 +10,6 @@ mod image_file;
 mod inputs;
 mod joints;
 mod manifest;
-mod mcap;
 mod named_poses;
 mod observation;
 mod observation_file;
@@ -24,6 +23,7 @@ mod puzzle;
 mod quaternion;
 mod read;
 mod recorded;
+mod recording;
 mod rotation_kind;
 mod run;
 mod sections;
@@ -45,11 +45,6 @@ pub use controller_poses::{ControllerPoses, ReadOtherwise};
 pub use inputs::InputFile;
 pub use joints::{Covariates, DEFAULT_PLACEMENT, SeriesStop, StopKey, Stops};
 pub use manifest::{AngleUnit, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder};
-pub use mcap::{
-    CameraInfo, Clock, Delay, Extracted, Motion, Picking, RecordingOptions, StopReport, extract, is_recording,
-};
-#[cfg(feature = "mcap")]
-pub use mcap::{FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, require_new, write_recording};
 pub use named_poses::{NamedPoses, read_named_poses};
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::{observations_csv, parse_observations};
@@ -62,6 +57,11 @@ pub use pose_file::PoseRow;
 pub use puzzle::{Next, Puzzle};
 pub use read::{Series, Source, read, read_images};
 pub use recorded::convert_recording;
+pub use recording::{
+    CameraInfo, Clock, Delay, Extracted, Motion, Picking, RecordingOptions, StopReport, extract, is_recording,
+};
+#[cfg(feature = "mcap")]
+pub use recording::{FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, require_new, write_recording};
 pub use rotation_kind::RotationKind;
 pub use run::Run;
 pub use sections::{

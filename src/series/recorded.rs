@@ -5,8 +5,8 @@ use std::path::Path;
 use super::camera_section::CameraMount;
 use super::joints::Stops;
 use super::manifest::{AngleUnit, Manifest};
-use super::mcap::{CameraInfo, Extracted, RecordingOptions, extract};
 use super::read::{Series, Source, file_name, manifest_beside, optional_images};
+use super::recording::{CameraInfo, Extracted, RecordingOptions, extract};
 use super::units::SMALL_DEG;
 use crate::error::{Code, Error, Notice, Result};
 

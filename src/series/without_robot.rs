@@ -6,10 +6,10 @@ use super::camera_section::CameraMount;
 use super::controller_file;
 use super::joints::{DEFAULT_PLACEMENT, SeriesStop, Stops};
 use super::manifest::Manifest;
-use super::mcap::is_recording;
 use super::observation_file;
 use super::plate_file::read_plate;
 use super::read::{Series, Source, file_name, folder_name, image_files, optional_images, plate_of, read};
+use super::recording::is_recording;
 use super::spatial::SpatialFiles;
 use crate::error::{Code, Error, Result};
 
