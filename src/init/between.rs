@@ -146,7 +146,7 @@ fn translated(triples: &[PoseTriple], rotations: &Rotations) -> Option<(Pose, f6
         let bound = 2.0 * median(&left).unwrap_or(f64::INFINITY) + f64::EPSILON;
         weights = left.iter().map(|l| (bound / l.max(f64::MIN_POSITIVE)).min(1.0)).collect();
     }
-    let sizes = triples.iter().zip(&left).map(|(t, l)| angle(t, rotations).norm() + l).collect();
+    let sizes = triples.iter().zip(&left).map(|(t, l)| angle(t, rotations).norm() + l);
     let translation = Vector3::new(solution[3], solution[4], solution[5]);
     Some((Pose::new(*v, translation), median(sizes).unwrap_or(f64::INFINITY)))
 }

@@ -6,7 +6,28 @@ use calib_targets_aruco::Dictionary;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use robotcal::detect::Picture;
+use robotcal::detect::{Detection, Picture};
+
+/// What was measured less the true pixels of the markers, px.
+pub fn errors(detection: &Detection, truth: impl Fn(u32) -> [f64; 2]) -> Vec<[f64; 2]> {
+    let error = |o: &robotcal::series::Observation| {
+        let truth = truth(o.marker);
+        [o.uv[0] - truth[0], o.uv[1] - truth[1]]
+    };
+    detection.observations.iter().map(error).collect()
+}
+
+/// Root of the mean square per axis.
+pub fn rms(errors: &[[f64; 2]]) -> f64 {
+    (errors.iter().map(|e| e[0] * e[0] + e[1] * e[1]).sum::<f64>() / (2 * errors.len()) as f64).sqrt()
+}
+
+/// The picture with left and right exchanged.
+pub fn mirror(picture: &Picture) -> Picture {
+    let mut pixels = picture.pixels.clone();
+    pixels.chunks_exact_mut(picture.width).for_each(<[f32]>::reverse);
+    Picture { pixels, ..*picture }
+}
 
 /// A projective map from the board (unit: one square, origin at the first inner corner, x right, y down) to pixels.
 #[derive(Debug, Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::boards_scene::{Print, Scene, View};
+use crate::boards_scene::{Print, Scene, View, errors, mirror, rms};
 use crate::said::assert_says;
 use calib_targets_aruco::Dictionary;
 use calib_targets_aruco::builtins::{
@@ -32,28 +32,6 @@ fn charuco_scene(angle: f64) -> Scene {
         print: Print::Charuco { dictionary: DICT_4X4_50, ratio: 0.7, legacy: false },
         ..Scene::new(COLUMNS, ROWS, view)
     }
-}
-
-fn rms(errors: &[[f64; 2]]) -> f64 {
-    (errors.iter().map(|e| e[0] * e[0] + e[1] * e[1]).sum::<f64>() / (2 * errors.len()) as f64).sqrt()
-}
-
-fn errors(detection: &Detection, truth: impl Fn(u32) -> [f64; 2]) -> Vec<[f64; 2]> {
-    detection
-        .observations
-        .iter()
-        .map(|o| {
-            let t = truth(o.marker);
-            [o.uv[0] - t[0], o.uv[1] - t[1]]
-        })
-        .collect()
-}
-
-fn mirror(picture: &Picture) -> Picture {
-    let pixels = (0..picture.pixels.len())
-        .map(|k| picture.at(picture.width - 1 - k % picture.width, k / picture.width))
-        .collect();
-    Picture { pixels, ..picture.clone() }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Chessboard corners on rendered boards with known truth.
 
-use crate::boards_scene::{Scene, View};
+use crate::boards_scene::{Scene, View, errors, mirror, rms};
 use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::detect::{Detection, Picture, detect, detect_series};
@@ -17,18 +17,6 @@ fn found(scene: &Scene, seed: u64) -> Detection {
     }
 }
 
-fn errors(scene: &Scene, detection: &Detection) -> Vec<[f64; 2]> {
-    let error = |o: &robotcal::series::Observation| {
-        let truth = scene.corner(o.marker);
-        [o.uv[0] - truth[0], o.uv[1] - truth[1]]
-    };
-    detection.observations.iter().map(error).collect()
-}
-
-fn rms(errors: &[[f64; 2]]) -> f64 {
-    (errors.iter().map(|e| e[0] * e[0] + e[1] * e[1]).sum::<f64>() / (2 * errors.len()) as f64).sqrt()
-}
-
 fn tilted(columns: u32, rows: u32, angle: f64) -> Scene {
     Scene::new(columns, rows, View::new(columns, rows, [321.3, 239.6], 33.0, angle, [0.02, -0.015]))
 }
@@ -39,7 +27,7 @@ fn corners_without_noise_are_exact_in_every_orientation() {
     for step in 0..12 {
         let scene = tilted(9, 6, f64::from(step) * std::f64::consts::TAU / 12.0);
         let detection = found(&scene, 0);
-        let errors = errors(&scene, &detection);
+        let errors = errors(&detection, |id| scene.corner(id));
         assert_eq!(detection.observations.len(), 54, "step {step}: {:?}", detection.dropped);
         assert!(detection.notices.is_empty(), "{:?}", detection.notices);
         assert!(rms(&errors) < 0.004, "step {step}: {}", rms(&errors));
@@ -54,7 +42,7 @@ fn the_stated_covariance_covers_the_noise() {
     for seed in 0..12 {
         let scene = Scene { noise: 8.0, ..tilted(9, 6, 0.5 * seed as f64) };
         let detection = found(&scene, seed);
-        for (o, e) in detection.observations.iter().zip(errors(&scene, &detection)) {
+        for (o, e) in detection.observations.iter().zip(errors(&detection, |id| scene.corner(id))) {
             let [uu, uv, vv] = o.covariance.expect("a covariance");
             let (uu, vv) = (uu - systematic, vv - systematic);
             normalised.push((e[0] * e[0] * vv - 2.0 * e[0] * e[1] * uv + e[1] * e[1] * uu) / (uu * vv - uv * uv) / 2.0);
@@ -113,7 +101,7 @@ fn uneven_light_does_not_move_corners() {
 #[test]
 fn over_exposed_squares_do_not_move_corners() {
     let scene = Scene { light: 330.0, ..tilted(9, 6, 0.3) };
-    let errors = errors(&scene, &found(&scene, 0));
+    let errors = errors(&found(&scene, 0), |id| scene.corner(id));
     assert!(rms(&errors) < 0.006, "{}", rms(&errors));
 }
 
@@ -123,7 +111,7 @@ fn sixteen_bits_are_used_in_full() {
     let scene = Scene { dark: 100.0, light: 420.0, full_scale: 65535.0, ..tilted(9, 6, 0.2) };
     let detection = found(&scene, 0);
     assert_eq!(detection.observations.len(), 54);
-    assert!(rms(&errors(&scene, &detection)) < 0.004);
+    assert!(rms(&errors(&detection, |id| scene.corner(id))) < 0.004);
 }
 
 #[test]
@@ -135,9 +123,9 @@ fn a_board_cut_by_the_edge_of_the_image_keeps_its_ids() {
             assert!(detection.observations.len() >= least, "{centre:?}: {}", detection.observations.len());
             assert!(detection.observations.len() < 54);
             assert!(
-                rms(&errors(&scene, &detection)) < 0.006,
+                rms(&errors(&detection, |id| scene.corner(id))) < 0.006,
                 "{centre:?} {angle}: {}",
-                rms(&errors(&scene, &detection))
+                rms(&errors(&detection, |id| scene.corner(id)))
             );
         }
     }
@@ -162,7 +150,11 @@ fn a_covered_part_is_left_out_and_the_rest_keeps_its_ids() {
     }
     let detection = detect(&picture, &plate(9, 6)).expect("a board");
     assert!((40..54).contains(&detection.observations.len()), "{}", detection.observations.len());
-    assert!(rms(&errors(&scene, &detection)) < 0.01, "{}", rms(&errors(&scene, &detection)));
+    assert!(
+        rms(&errors(&detection, |id| scene.corner(id))) < 0.01,
+        "{}",
+        rms(&errors(&detection, |id| scene.corner(id)))
+    );
 }
 
 #[test]
@@ -184,20 +176,13 @@ fn inverse(picture: &Picture) -> Picture {
     Picture { pixels: picture.pixels.iter().map(|p| 220.0 - p).collect(), ..picture.clone() }
 }
 
-fn mirror(picture: &Picture) -> Picture {
-    let pixels = (0..picture.pixels.len())
-        .map(|k| picture.at(picture.width - 1 - k % picture.width, k / picture.width))
-        .collect();
-    Picture { pixels, ..picture.clone() }
-}
-
 #[test]
 fn a_board_that_is_its_own_half_turn_is_upright_with_a_notice() {
     for (columns, rows) in [(9, 7), (8, 6)] {
         let scene = tilted(columns, rows, 0.4);
         let detection = found(&scene, 0);
         assert!(matches!(&detection.notices[..], [n] if n.code == Code::PlateSymmetric), "{:?}", detection.notices);
-        assert!(rms(&errors(&scene, &detection)) < 0.004);
+        assert!(rms(&errors(&detection, |id| scene.corner(id))) < 0.004);
     }
 }
 

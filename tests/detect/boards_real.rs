@@ -1,7 +1,8 @@
 //! Chessboards of real robots, where the recordings are at hand.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use crate::robots::shared;
 use robotcal::detect::{Detection, detect_series, load};
 use robotcal::geom::PlaneMap;
 use robotcal::series::{Plate, PlateKind};
@@ -24,24 +25,20 @@ fn largest_misfit(detection: &Detection) -> f64 {
     pairs.iter().map(distance).fold(0.0, f64::max)
 }
 
-/// The images of a real series in order of their names; none where no recordings are at hand.
-fn images_of(series: &str) -> Option<Vec<PathBuf>> {
-    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/real"));
-    if !root.is_dir() {
-        println!("skipped: no recordings in {}", root.display());
-        return None;
-    }
-    let mut images: Vec<PathBuf> =
-        std::fs::read_dir(root.join(series).join("images")).unwrap().map(|e| e.unwrap().path()).collect();
+/// The images of a real series in order of their names.
+fn images_of(series: &str) -> Vec<PathBuf> {
+    let folder = shared("real").join(series).join("images");
+    let mut images: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
     images.sort();
-    Some(images)
+    images
 }
 
 #[test]
+#[ignore = "needs the real series"]
 fn all_corners_of_the_real_boards_are_found_with_the_right_ids() {
     let plate = Plate::lattice(PlateKind::Chessboard, COLUMNS, ROWS, 0.01, 5e-5);
     for series in ["nachi-2025-01-17", "nachi-2025-02-04", "nachi-2025-02-19", "aubo-2024-12-16"] {
-        let Some(images) = images_of(series) else { return };
+        let images = images_of(series);
         assert_eq!(images.len(), 24, "{series}");
         for (path, found) in images.iter().zip(detect_series(&images, &plate, |path| load(path, None), |_| ())) {
             let detection = found.detection;
@@ -57,10 +54,11 @@ fn all_corners_of_the_real_boards_are_found_with_the_right_ids() {
 
 /// Webcams that sharpen and compress: squares from 11 px, edges steeper than a lens makes them.
 #[test]
+#[ignore = "needs the real series"]
 fn boards_of_webcams_are_complete() {
     let plate = Plate::lattice(PlateKind::Chessboard, 9, 7, 0.02, 1e-4);
     for series in ["ur3a-cam1", "ur3a-cam2"] {
-        let Some(images) = images_of(series) else { return };
+        let images = images_of(series);
         assert_eq!(images.len(), 40, "{series}");
         for (path, found) in images.iter().zip(detect_series(&images, &plate, |path| load(path, None), |_| ())) {
             let detection = found.detection;
@@ -71,13 +69,14 @@ fn boards_of_webcams_are_complete() {
 
 /// A plate file with a line more or fewer than real boards have: no image is used, and the size that is seen is named.
 #[test]
+#[ignore = "needs the real series"]
 fn another_size_than_that_of_a_real_board_is_named() {
     for (series, kind, [columns, rows]) in [
         ("nachi-2025-01-17", PlateKind::Chessboard, [COLUMNS, ROWS]),
         ("ur3a-cam1", PlateKind::Chessboard, [9, 7]),
         ("ric-10x10", PlateKind::CircleGrid, [10, 10]),
     ] {
-        let Some(mut images) = images_of(series) else { return };
+        let mut images = images_of(series);
         images.truncate(6);
         let sizes = [[columns - 1, rows], [columns + 1, rows], [columns, rows - 1], [columns, rows + 1]];
         for [c, r] in sizes {

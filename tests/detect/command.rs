@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
+use crate::program::{robotcal, text};
 use crate::said::{Said, assert_says};
 use image::{DynamicImage, GrayImage, Luma};
 use robotcal::Code;
@@ -12,14 +12,6 @@ use robotcal::series::{Observation, Source, read};
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn robotcal(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).output().unwrap()
-}
-
-fn text(output: &Output) -> String {
-    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
 fn name(path: &Path) -> &str {

@@ -1,6 +1,6 @@
 //! Corners of rendered pictures from sharpened to defocused, against truth, the bound of Cramer and Rao, and the stated covariance.
 
-use crate::boards_scene::{Scene, View};
+use crate::boards_scene::{Scene, View, errors};
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use robotcal::detect::{Detection, Picture, detect, load_bytes};
@@ -34,14 +34,6 @@ fn scene(square: f64, blur: f64, noise: f64, seed: u64) -> Scene {
 fn found(picture: &Picture) -> Detection {
     let plate = Plate::lattice(PlateKind::Chessboard, COLUMNS, ROWS, 0.01, 1e-4);
     detect(picture, &plate).unwrap_or_else(|error| panic!("{error}"))
-}
-
-fn errors(scene: &Scene, detection: &Detection) -> Vec<[f64; 2]> {
-    let error = |o: &robotcal::series::Observation| {
-        let truth = scene.corner(o.marker);
-        [o.uv[0] - truth[0], o.uv[1] - truth[1]]
-    };
-    detection.observations.iter().map(error).collect()
 }
 
 /// Unsharp mask: the picture plus `amount` times what a Gaussian of `sigma` px takes away, in whole counts.
@@ -84,7 +76,8 @@ fn sharpening_neither_loses_nor_moves_corners() {
                 let detection = found(&sharpened(&scene.render(0), amount, sigma));
                 let case = format!("squares of {square} px, blur {blur} px, sharpened {amount} at {sigma} px");
                 assert_eq!(detection.observations.len(), CORNERS, "{case}: {:?}", detection.dropped);
-                let largest = errors(&scene, &detection).iter().map(|e| e[0].hypot(e[1])).fold(0.0, f64::max);
+                let largest =
+                    errors(&detection, |id| scene.corner(id)).iter().map(|e| e[0].hypot(e[1])).fold(0.0, f64::max);
                 println!("{case}: {largest:.4} px");
                 assert!(largest < 0.02, "{case}: {largest}");
             }
@@ -98,7 +91,7 @@ fn compressed_pictures_keep_their_corners() {
         let scene = scene(33.0, blur, 2.0, 1);
         let detection = found(&compressed(&sharpened(&scene.render(1), 1.0, 0.7), 70));
         assert_eq!(detection.observations.len(), CORNERS, "blur {blur}: {:?}", detection.dropped);
-        let errors = errors(&scene, &detection);
+        let errors = errors(&detection, |id| scene.corner(id));
         let rms = (errors.iter().map(|e| e[0] * e[0] + e[1] * e[1]).sum::<f64>() / (2 * CORNERS) as f64).sqrt();
         println!("blur {blur} px: {rms:.4} px");
         assert!(rms < 0.03, "blur {blur}: {rms}");
@@ -216,7 +209,7 @@ fn with_spoilt_noise(square: f64, blur: f64, noise: f64, seeds: u64, spoilt: Spo
         let scene = scene(square, blur, noise, seed);
         let detection = found(&spoilt(&scene.render(seed)));
         assert_eq!(detection.observations.len(), CORNERS, "{square} {blur}: {:?}", detection.dropped);
-        for (o, e) in detection.observations.iter().zip(errors(&scene, &detection)) {
+        for (o, e) in detection.observations.iter().zip(errors(&detection, |id| scene.corner(id))) {
             let [uu, uv, vv] = o.covariance.expect("a covariance");
             let (uu, vv) = (uu - systematic, vv - systematic);
             squares += (e[0] * e[0] + e[1] * e[1]) / 2.0;
@@ -314,7 +307,7 @@ fn study_of_boards_along_the_rows() {
                 let centre = [226.3 + 0.1 * f64::from(place), 225.7 + 0.37 * f64::from(place)];
                 let view = View::new(COLUMNS, ROWS, centre, 33.07, degrees.to_radians(), [0.0; 2]);
                 let scene = Scene { view, ..scene(33.0, blur, 0.0, 0) };
-                for e in errors(&scene, &found(&scene.render(0))) {
+                for e in errors(&found(&scene.render(0)), |id| scene.corner(id)) {
                     squares += (e[0] * e[0] + e[1] * e[1]) / 2.0;
                     count += 1.0;
                 }

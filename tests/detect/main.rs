@@ -6,6 +6,10 @@
 mod boards_scene;
 #[path = "../circles_support/mod.rs"]
 mod circles_support;
+#[path = "../support/command.rs"]
+mod program;
+#[path = "../support/robots.rs"]
+mod robots;
 #[path = "../said/mod.rs"]
 mod said;
 

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use robotcal::Code;
-use robotcal::detect::{Picture, detect, detect_series};
+use robotcal::detect::{detect, detect_series};
 use robotcal::series::{Plate, parse_plate};
 
+use crate::boards_scene::mirror;
 use crate::circles_support::{Scene, View, pose, scene, standard_plate};
 use crate::said::assert_says;
 
@@ -127,12 +128,6 @@ fn clipped_paper_moves_no_corner_of_an_aprilgrid() {
     let tally = run(APRILGRID, 1.3);
     assert_eq!(tally.wrong, 0);
     assert!(tally.found as f64 >= 0.95 * tally.visible as f64 && tally.rms < 0.03, "{tally:?}");
-}
-
-fn mirror(picture: &Picture) -> Picture {
-    let mut pixels = picture.pixels.clone();
-    pixels.chunks_exact_mut(picture.width).for_each(<[f32]>::reverse);
-    Picture { pixels, ..*picture }
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! Lenses that no formula fits: the displacement field takes up what is left, and says where it knows nothing.
 
-use std::path::Path;
-
+use crate::robots::ur10e;
 use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 use robotcal::assess::ProjectionMap;
 use robotcal::geom::skew;
@@ -11,18 +10,12 @@ use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::problem::MeasuredSeries;
 use robotcal::simulate::{WorldRequest, series};
 use robotcal::study::measured;
-use robotcal::urdf::{Chain, read};
 
 /// Noise of an observation, px per axis.
 const NOISE_PX: f64 = 0.02;
 
 /// The image is covered up to here, px.
 const COVERED_TO: f64 = 960.0;
-
-fn chain() -> Chain {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf");
-    read(&path).unwrap().chain(Some("base_link"), Some("tool0")).unwrap()
-}
 
 /// What the true lens does beyond Brown-Conrady, px: rings about a point, and a dent. It is no spline.
 fn beyond(uv: &Vector2<f64>) -> Vector2<f64> {
@@ -41,10 +34,10 @@ fn seen(lens: Lens) -> (MeasuredSeries, Camera) {
         held_out: 2,
         pixel_sigma_px: NOISE_PX,
         seed: 11,
-        ..WorldRequest::typical(chain(), plate)
+        ..WorldRequest::typical(ur10e(), plate)
     };
     let world = series(&request).unwrap();
-    let mut seen = measured(&world, &chain());
+    let mut seen = measured(&world, &ur10e());
     for o in seen.stops.iter_mut().flat_map(|s| &mut s.observations) {
         let uv = Vector2::from(o.uv);
         o.uv = (uv + beyond(&uv)).into();
@@ -98,8 +91,8 @@ fn observed(series: &MeasuredSeries, at: &Vector2<f64>, within_px: f64) -> usize
 #[test]
 fn a_lens_that_brown_cannot_fit_is_fitted_to_the_noise() {
     let [(brown, truth), (with_field, _)] = [Lens::Brown, Lens::BrownField].map(seen);
-    let plain = identify(chain(), std::slice::from_ref(&brown), &Options::default()).unwrap();
-    let s = identify(chain(), &[with_field], &Options::default()).unwrap();
+    let plain = identify(ur10e(), std::slice::from_ref(&brown), &Options::default()).unwrap();
+    let s = identify(ur10e(), &[with_field], &Options::default()).unwrap();
     println!("residual px per axis: brown {:.4}, brown+field {:.4}", rms(&plain), rms(&s));
     // The noise, less some three percent that parameters take up.
     assert!(rms(&plain) > 5.0 * NOISE_PX && (rms(&s) / NOISE_PX - 1.0).abs() < 0.06, "{} {}", rms(&plain), rms(&s));

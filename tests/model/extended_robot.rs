@@ -1,7 +1,6 @@
 //! Robots with and without errors beyond rigid geometry: the extended model helps where they are, and costs nothing where they are not.
 
-use std::path::Path;
-
+use crate::robots::kr6;
 use robotcal::assess::{flange_error_m, median};
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Selection, StatedPrior, identify};
@@ -10,23 +9,17 @@ use robotcal::problem::OriginPrior;
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
 use robotcal::study::measured;
-use robotcal::urdf::{Chain, read};
-
-fn chain() -> Chain {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    read(&path).unwrap().chain(None, None).unwrap()
-}
 
 fn world(errors: RobotErrors, seed: u64) -> SimulatedSeries {
     let plate = Plate::lattice(PlateKind::Points, 8, 6, 0.03, 0.03e-3);
-    let request = WorldRequest { images: 40, held_out: 60, errors, seed, ..WorldRequest::typical(chain(), plate) };
+    let request = WorldRequest { images: 40, held_out: 60, errors, seed, ..WorldRequest::typical(kr6(), plate) };
     series(&request).unwrap()
 }
 
 /// RMS error of the flange over readings that no image was taken at, mm; and what the evidence said.
 fn error_mm(world: &SimulatedSeries, seen: &MeasuredSeries, model: RobotModel) -> (f64, String) {
     let options = Options { model, ..Options::default() };
-    let s = identify(chain(), std::slice::from_ref(seen), &options).unwrap();
+    let s = identify(kr6(), std::slice::from_ref(seen), &options).unwrap();
     let poses: Vec<(Vec<f64>, Pose)> =
         world.truth.held_out.iter().map(|h| (h.readings.clone(), h.base_from_tip.pose())).collect();
     let evidences: Vec<String> = s.evidences.iter().map(|e| format!("{:?} {:.1}", e.model, e.log_evidence)).collect();
@@ -36,7 +29,7 @@ fn error_mm(world: &SimulatedSeries, seen: &MeasuredSeries, model: RobotModel) -
 fn ratios(errors: RobotErrors, seeds: std::ops::RangeInclusive<u64>) -> Vec<f64> {
     let of = |seed: u64| {
         let world = world(errors, seed);
-        let seen = measured(&world, &chain());
+        let seen = measured(&world, &kr6());
         let (rigid, _) = error_mm(&world, &seen, RobotModel::Rigid);
         let (extended, evidences) = error_mm(&world, &seen, RobotModel::Auto);
         let ratio = extended / rigid;
@@ -70,9 +63,9 @@ fn terms_that_are_present_are_found() {
 #[test]
 fn how_far_origins_are_off_is_told_by_the_robot_itself() {
     let factor = |errors: RobotErrors, selection: Selection| {
-        let seen = measured(&world(errors, 3), &chain());
+        let seen = measured(&world(errors, 3), &kr6());
         let options = Options { model: RobotModel::Rigid, selection, ..Options::default() };
-        identify(chain(), &[seen], &options).unwrap().fit.adjustment.problem
+        identify(kr6(), &[seen], &options).unwrap().fit.adjustment.problem
     };
     let usual = OriginPrior::default();
     let times = |f: f64| RobotErrors {

@@ -1,7 +1,6 @@
 //! Lenses: simulated ones are recovered, the evidence tells them apart, and what ROS cannot say is said with its loss.
 
-use std::path::Path;
-
+use crate::robots::ur10e;
 use robotcal::assess::Limits;
 use robotcal::identify::{Options, RobotModel, Solution, choose_lens, depths_m, identify};
 use robotcal::model::camera::{Camera, Lens, fit_lens};
@@ -9,12 +8,6 @@ use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::problem::{Adjustment, LensChoice};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::study::measured;
-use robotcal::urdf::{Chain, read};
-
-fn chain() -> Chain {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf");
-    read(&path).unwrap().chain(Some("base_link"), Some("tool0")).unwrap()
-}
 
 fn world(lens: Lens, field_deg: f64) -> SimulatedSeries {
     let plate = design(&PlateRequest { markers: Some(120), ..PlateRequest::default() }).unwrap().plate;
@@ -23,7 +16,7 @@ fn world(lens: Lens, field_deg: f64) -> SimulatedSeries {
         images: 10,
         held_out: 2,
         seed: 7,
-        ..WorldRequest::typical(chain(), plate)
+        ..WorldRequest::typical(ur10e(), plate)
     };
     series(&request).unwrap()
 }
@@ -39,9 +32,9 @@ fn hold_out_tells_lenses_apart() {
         (Lens::Parallax, 60.0, &[Lens::Brown, Lens::Fisheye, Lens::Rational, Lens::ThinPrism][..]),
     ] {
         let made = world(lens, field_deg);
-        let mut seen = vec![measured(&made, &chain())];
+        let mut seen = vec![measured(&made, &ur10e())];
         seen[0].lens = Lens::Brown;
-        let notices = choose_lens(&chain(), &mut seen, &["camera".into()], &Limits::default()).unwrap();
+        let notices = choose_lens(&ur10e(), &mut seen, &["camera".into()], &Limits::default()).unwrap();
         println!("{lens:?}: {}", notices[0]);
         let chosen = seen[0].lens;
         assert!(!not.contains(&chosen), "{lens:?} taken for {chosen:?}: {}", notices[0]);
@@ -89,11 +82,11 @@ fn rays_and_projections_undo_each_other_through_every_lens() {
 
 /// The camera of a world as the joint fit finds it.
 fn found(made: &SimulatedSeries, lens: Lens, choice: LensChoice) -> Solution {
-    let mut seen = vec![measured(made, &chain())];
+    let mut seen = vec![measured(made, &ur10e())];
     seen[0].lens = lens;
     seen[0].lens_choice = choice;
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
-    identify(chain(), &seen, &options).unwrap()
+    identify(ur10e(), &seen, &options).unwrap()
 }
 
 #[test]

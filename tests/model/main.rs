@@ -2,6 +2,8 @@
 
 #![allow(missing_docs, clippy::expect_used, clippy::panic, clippy::unwrap_used)]
 
+#[path = "../support/robots.rs"]
+mod robots;
 #[path = "../support/mod.rs"]
 mod support;
 

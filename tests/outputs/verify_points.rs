@@ -11,6 +11,7 @@ use robotcal::identify::Estimator;
 use robotcal::model::robot::Robot;
 use robotcal::simulate::truth::Truth;
 
+use crate::robots::kr6_urdf;
 use crate::verify_series::codes;
 
 /// A copy of a series with its first 24 stops.
@@ -98,7 +99,7 @@ fn a_two_stage_result_is_written_shown_judged_and_solved_again_like_a_joint_one(
 const NOISE_M: f64 = 5e-5;
 
 fn kr6() -> (PathBuf, Robot) {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let robot = Robot::nominal(robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap());
     (urdf, robot)
 }

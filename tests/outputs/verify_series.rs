@@ -7,6 +7,7 @@ use std::process::Output;
 use assert_cmd::Command;
 use robotcal::Code;
 
+use crate::robots::kr6_urdf;
 use crate::support::by_poses::with_poses;
 
 fn root() -> &'static Path {
@@ -36,7 +37,7 @@ fn observed(into: &Path) -> PathBuf {
 
 #[test]
 fn poses_of_a_controller_judge_a_model_as_the_readings_do() {
-    let urdf = root().join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let report = root().join("reports/kr6_small");
     let folder = tempfile::tempdir().unwrap();
     let joints = observed(folder.path());
@@ -119,7 +120,7 @@ fn with_other_zero(series: &Path, joint: &str, deg: f64) {
 /// A robot that changed since it was identified, or a series that is at fault, is not a good model for being better than the nominal one.
 #[test]
 fn a_model_that_misses_more_than_its_solution_states_is_not_trusted() {
-    let nominal = root().join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let nominal = kr6_urdf();
     let urdf = root().join("reports/kr6_small/kuka_kr6_r900.calibrated.urdf");
     let compared = ["--nominal", nominal.to_str().unwrap()];
     let folder = tempfile::tempdir().unwrap();
@@ -147,7 +148,7 @@ fn a_model_that_misses_more_than_its_solution_states_is_not_trusted() {
 
 #[test]
 fn the_series_that_a_model_was_fitted_to_proves_nothing() {
-    let nominal = root().join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let nominal = kr6_urdf();
     let folder = tempfile::tempdir().unwrap();
     let series = simulated(&nominal, &folder.path().join("series"), "rigid", &[]);
     let out = folder.path().join("result");

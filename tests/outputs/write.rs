@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use crate::robots::kr6_urdf;
 use robotcal::Code;
 use robotcal::output::{NewFolder, ResultFolder, recover, write_all, write_beside};
 use robotcal::series::InputFile;
@@ -555,7 +556,7 @@ fn robotcal(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
 #[test]
 fn a_result_of_which_many_images_are_left_out_is_read_back() {
     let root = tempfile::tempdir().unwrap();
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let urdf = urdf.to_str().unwrap();
     let run = |args: &str| {
         robotcal(root.path(), &args.split(' ').map(|a| if a == "URDF" { urdf } else { a }).collect::<Vec<_>>())

@@ -5,6 +5,7 @@ pub mod truth_frame;
 
 use std::path::Path;
 
+use crate::robots::kr6_urdf;
 use nalgebra::{Vector2, Vector3, Vector6};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -30,7 +31,7 @@ impl Normal {
 }
 
 pub fn robot() -> RobotDescription {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let path = kr6_urdf();
     robotcal::urdf::read(&path).unwrap()
 }
 

@@ -22,6 +22,7 @@ use robotcal::simulate::truth::Truth;
 
 use crate::programs_support::touching::{Toucher, ranges, spread, write};
 use crate::programs_support::{Run, findings, repo};
+use crate::robots::KR6;
 use crate::said::assert_says;
 
 const TOOL: [f64; 3] = [0.012, -0.02, 0.11];
@@ -204,8 +205,7 @@ fn a_program_with_measured_frames_brings_the_tool_where_it_was_meant() {
     let program = folder.path().join("t.csv");
     std::fs::write(&program, table).unwrap();
     let path = |p: &str| repo(p).to_str().unwrap().to_owned();
-    let (urdf, kr6) =
-        (path("reports/kr6_small/kuka_kr6_r900.calibrated.urdf"), path("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"));
+    let (urdf, kr6) = (path("reports/kr6_small/kuka_kr6_r900.calibrated.urdf"), path(KR6));
     let compensation = path("reports/kr6_small/compensation.toml");
     let tool = format!("--tool={},{},{},0,0,0,1", TOOL[0], TOOL[1], TOOL[2]);
     let frames = frames.join("frames.json");
@@ -272,12 +272,8 @@ fn places_of_another_frame_than_the_base_are_told() {
     let row: Vec<String> = START.iter().map(f64::to_string).collect();
     std::fs::write(&program, format!("{}\n{}\n", world.truth.chain.readings.join(","), row.join(","))).unwrap();
     let path = |p: &str| repo(p).to_str().unwrap().to_owned();
-    let [nominal, urdf, compensation] = [
-        "robots/kuka_kr6_r900/kuka_kr6_r900.urdf",
-        "reports/kr6_small/kuka_kr6_r900.calibrated.urdf",
-        "reports/kr6_small/compensation.toml",
-    ]
-    .map(path);
+    let [nominal, urdf, compensation] =
+        [KR6, "reports/kr6_small/kuka_kr6_r900.calibrated.urdf", "reports/kr6_small/compensation.toml"].map(path);
     let tool = format!("--tool={},{},{},0,0,0,1", TOOL[0], TOOL[1], TOOL[2]);
     let file = frames.join("frames.json");
     let mut args = vec!["compensate", program.to_str().unwrap(), "--nominal", &nominal, "--urdf", &urdf];

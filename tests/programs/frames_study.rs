@@ -24,6 +24,7 @@ use robotcal::urdf::{Chain, read};
 
 use crate::programs_support::repo;
 use crate::programs_support::touching::{Toucher, ranges, spread};
+use crate::robots::kr6_urdf;
 
 /// Sigma of a touch per axis, m.
 const TOUCH_M: f64 = 5e-5;
@@ -187,7 +188,7 @@ impl Robots {
 }
 
 fn kuka() -> Chain {
-    read(&repo("robots/kuka_kr6_r900/kuka_kr6_r900.urdf")).unwrap().chain(Some("base_link"), Some("link_6")).unwrap()
+    read(&kr6_urdf()).unwrap().chain(Some("base_link"), Some("link_6")).unwrap()
 }
 
 /// A KR 6 with errors of the size of the priors, identified from 40 stops.

@@ -4,6 +4,8 @@
 
 #[path = "../programs_support/mod.rs"]
 mod programs_support;
+#[path = "../support/robots.rs"]
+mod robots;
 #[path = "../said/mod.rs"]
 mod said;
 

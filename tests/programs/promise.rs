@@ -1,7 +1,6 @@
 //! What a corrected program promises in the base frame, against what simulated robots do.
 
-use std::path::Path;
-
+use crate::robots::kr6_to_link_6;
 use rayon::prelude::*;
 use robotcal::assess::sigma_in_base;
 use robotcal::geom::Pose;
@@ -11,15 +10,9 @@ use robotcal::model::robot::Robot;
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{RobotErrors, WorldRequest, series};
 use robotcal::study::measured;
-use robotcal::urdf::{Chain, read};
 
 /// Targets of every program.
 const TARGETS: usize = 20;
-
-fn chain() -> Chain {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    read(&path).unwrap().chain(Some("base_link"), Some("link_6")).unwrap()
-}
 
 /// The sum of squares of error and of stated error over the targets of a world, m^2, and the mean square of their ratios.
 fn world(errors: RobotErrors, seed: u64) -> [f64; 3] {
@@ -34,13 +27,13 @@ fn world(errors: RobotErrors, seed: u64) -> [f64; 3] {
         least_markers: 12,
         held_out: TARGETS,
         seed,
-        ..WorldRequest::typical(chain(), plate)
+        ..WorldRequest::typical(kr6_to_link_6(), plate)
     };
     let made = series(&request).unwrap();
     let options = Options { model: RobotModel::Full, ..Options::default() };
-    let s = identify(chain(), &[measured(&made, &chain())], &options).unwrap();
+    let s = identify(kr6_to_link_6(), &[measured(&made, &kr6_to_link_6())], &options).unwrap();
     let found = s.exported_robot();
-    let (nominal, truth) = (Robot::nominal(chain()), made.truth.robot(&chain()).unwrap());
+    let (nominal, truth) = (Robot::nominal(kr6_to_link_6()), made.truth.robot(&kr6_to_link_6()).unwrap());
     let limits = reading_limits(&nominal.chain);
     let mut sums = [0.0; 3];
     let mut count = 0.0;

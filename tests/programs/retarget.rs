@@ -9,7 +9,8 @@ use robotcal::programs::{
 };
 use robotcal::urdf::{Chain, read};
 
-use crate::programs_support::{Cell, assert_meets, repo};
+use crate::programs_support::{Cell, assert_meets};
+use crate::robots::kr6_urdf;
 
 /// A program by the nominal robot of a chain, run by another one whose work object is elsewhere.
 fn outcomes(name: &str, text: String, to: &Robot, from: &Chain, moved: Option<Pose>) -> (Vec<TargetOutcome>, String) {
@@ -97,7 +98,7 @@ fn a_target_with_aligned_wrist_axes_is_singular_wherever_the_cell_stands() {
 #[test]
 fn external_axes_keep_their_value_beside_axis_angles() {
     let folder = tempfile::tempdir().unwrap();
-    let text = std::fs::read_to_string(repo("robots/kuka_kr6_r900/kuka_kr6_r900.urdf")).unwrap();
+    let text = std::fs::read_to_string(kr6_urdf()).unwrap();
     let rail = "<link name=\"rail\"/><joint name=\"slide\" type=\"prismatic\"><parent link=\"rail\"/><child link=\"base_link\"/>\
                 <axis xyz=\"1 0 0\"/><limit lower=\"0\" upper=\"3\" effort=\"1\" velocity=\"1\"/></joint></robot>";
     let path = folder.path().join("rail.urdf");

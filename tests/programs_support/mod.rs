@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use crate::robots::kr6_urdf;
 use nalgebra::Vector6;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -86,7 +87,7 @@ impl Cell {
     }
 
     pub fn kuka(seed: u64) -> Self {
-        Self::new(&repo("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"), ("base_link", "tool0"), seed)
+        Self::new(&kr6_urdf(), ("base_link", "tool0"), seed)
     }
 
     pub fn ur(seed: u64) -> Self {

@@ -6,6 +6,8 @@
 mod readers;
 #[path = "../recording_support/mod.rs"]
 mod recording_support;
+#[path = "../support/robots.rs"]
+mod robots;
 #[path = "../said/mod.rs"]
 mod said;
 

@@ -1,22 +1,13 @@
 //! Series and tables on measured data, where they are at hand.
 
-use std::path::{Path, PathBuf};
-
+use crate::robots::shared;
 use robotcal::series::{PlateKind, Source, read};
 use robotcal::urdf;
 
-fn real() -> Option<PathBuf> {
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/real"));
-    if !folder.is_dir() {
-        eprintln!("skipped: {} is not there", folder.display());
-        return None;
-    }
-    Some(folder.to_path_buf())
-}
-
 #[test]
+#[ignore = "needs the real series"]
 fn real_series_are_read_without_complaint() {
-    let Some(real) = real() else { return };
+    let real = shared("real");
     for (name, pitch_m, camera) in [
         ("nachi-2025-01-17", 0.015, "photoneo"),
         ("nachi-2025-02-04", 0.015, "photoneo"),

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::recording_support::annotations;
+use crate::robots::kr6_urdf;
 use serde_json::Value;
 
 fn shipped(path: &str) -> PathBuf {
@@ -31,7 +32,7 @@ fn holds(message: &[u8], values: &[f64]) -> bool {
 fn camera_frames_and_residuals_of_the_solution_are_in_the_recording() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
-    let urdf = shipped("robots/kuka_kr6_r900/kuka_kr6_r900.urdf").display().to_string();
+    let urdf = kr6_urdf().display().to_string();
     let series = shipped("datasets/kr6_small").display().to_string();
     run(&["identify", "--urdf", &urdf, "--series", &series, "--robot-model", "rigid", "--out", &at("result")]);
     let solution = at("result/solution.json");

@@ -1,7 +1,5 @@
 //! What differs between two series of one robot, or within one of them, is named: the zero of a joint, the camera on its mount, the plate.
 
-use std::path::Path;
-
 use robotcal::diagnose::{Carried, Displaced, Displacement, Finding, ZeroMoved};
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
@@ -9,16 +7,11 @@ use robotcal::problem::MeasuredSeries;
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
 use robotcal::study::measured;
-use robotcal::urdf::Chain;
 
+use crate::robots::kr6;
 use crate::support::displaced::change;
 
 const STOPS: usize = 48;
-
-fn chain() -> Chain {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap()
-}
 
 /// The plate stands in one place for the first half, in another for the second.
 fn seen(seed: u64) -> SimulatedSeries {
@@ -29,14 +22,14 @@ fn seen(seed: u64) -> SimulatedSeries {
         placements: 2,
         least_markers: 12,
         seed,
-        ..WorldRequest::typical(chain(), plate)
+        ..WorldRequest::typical(kr6(), plate)
     };
     series(&request).unwrap()
 }
 
 /// As two series with one camera, each with its place of the plate; `shifted` changes the readings of the second.
 fn halves(made: &SimulatedSeries, shifted: impl Fn(usize, &mut Vec<f64>)) -> [MeasuredSeries; 2] {
-    let whole = measured(made, &chain());
+    let whole = measured(made, &kr6());
     let first = whole.stops[0].placement.clone();
     let half = |name: &str, is_first: bool| {
         let mut own = MeasuredSeries { name: name.into(), ..whole.clone() };
@@ -52,7 +45,7 @@ fn halves(made: &SimulatedSeries, shifted: impl Fn(usize, &mut Vec<f64>)) -> [Me
 }
 
 fn solved(series: &[MeasuredSeries]) -> Solution {
-    identify(chain(), series, &Options { model: RobotModel::Rigid, ..Options::default() }).unwrap()
+    identify(kr6(), series, &Options { model: RobotModel::Rigid, ..Options::default() }).unwrap()
 }
 
 fn zeros(solution: &Solution) -> Vec<ZeroMoved> {

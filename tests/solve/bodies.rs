@@ -15,6 +15,7 @@ use robotcal::solve::{Elimination, System};
 use robotcal::urdf::Chain;
 
 use crate::measured_worlds::{Kind, World};
+use crate::robots::kr6_urdf;
 use crate::said::assert_says;
 use crate::support::small::Dice;
 
@@ -193,7 +194,7 @@ fn a_folder_of_contacts_gives_a_robot_and_its_record_gives_it_again() {
     let world = World::sockets(7, 3, 14, 5e-5, 2e-5);
     let folder = tempfile::tempdir().unwrap();
     written(&world, folder.path());
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
     let calibration = robotcal::calibrate(&urdf, [folder.path()], &options).unwrap();
     let files = calibration.files(&Export { poses: Poses::Written, ..Export::default() }).unwrap();

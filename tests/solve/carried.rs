@@ -17,6 +17,7 @@ use robotcal::urdf::{BASE_FROM_BASE, Chain, RobotDescription, patch_origins};
 
 use crate::coverage::world;
 use crate::measured_worlds::{Kind, World, readings, truth};
+use crate::robots::kr6_urdf;
 use crate::said::assert_says;
 use crate::support::small::Dice;
 
@@ -35,7 +36,7 @@ const RAIL: &str = r#"
 "#;
 
 fn arm() -> RobotDescription {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     robotcal::urdf::read(&urdf).unwrap()
 }
 

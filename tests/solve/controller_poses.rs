@@ -19,6 +19,7 @@ use robotcal::study::measured;
 use robotcal::{Code, Error};
 use tempfile::TempDir;
 
+use crate::robots::kr6_urdf;
 use crate::support::small::Dice;
 
 const SIGMA_M: f64 = 2e-4;
@@ -301,7 +302,7 @@ fn mistakes_in_the_poses_are_not_blamed_on_right_angles_of_the_first_stop() {
 /// the target pose.
 #[test]
 fn poses_of_a_tool_or_in_a_frame_are_told_from_those_of_the_flange_in_the_base() {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let chain = robotcal::urdf::read(&urdf).unwrap().chain(Some("base_link"), Some("link_6")).unwrap();
     let plate = design(&PlateRequest { markers: Some(60), ..PlateRequest::default() }).unwrap().plate;
     let made = simulated(&WorldRequest { images: 40, seed: 5, ..WorldRequest::typical(chain.clone(), plate) }).unwrap();
@@ -390,7 +391,7 @@ fn the_images_tell_in_which_posture_a_pose_was_reached() {
 
 #[test]
 fn a_wrist_turned_over_at_all_stops_is_told_to_be_open() {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let chain = robotcal::urdf::read(&urdf).unwrap().chain(Some("base_link"), Some("link_6")).unwrap();
     let plate = design(&PlateRequest { markers: Some(60), ..PlateRequest::default() }).unwrap().plate;
     let made = simulated(&WorldRequest { images: 24, seed: 4, ..WorldRequest::typical(chain.clone(), plate) }).unwrap();

@@ -1,5 +1,6 @@
 //! Stated uncertainties against known truth, over independent worlds.
 
+use crate::robots::kr6;
 use nalgebra::Vector6;
 use robotcal::assess::{MeasuredPoint, View, fit_points, predict_pose};
 use robotcal::geom::Pose;
@@ -10,14 +11,8 @@ use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
 use robotcal::study::measured;
 use robotcal::urdf::Chain;
-use std::path::Path;
 
 const SEEDS: u64 = 20;
-
-fn chain() -> Chain {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap()
-}
 
 /// 50 stops with typical errors: 0.3 mm, 1 mrad, offsets of 3 mrad, 0.02 mrad of joint noise, 0.05 px.
 pub fn world(chain: &Chain, seed: u64) -> SimulatedSeries {
@@ -73,7 +68,7 @@ fn share<'a>(values: impl Iterator<Item = &'a f64>, bound: f64) -> f64 {
 
 #[test]
 fn held_out_poses_lie_within_their_stated_sigmas_and_are_ten_times_better_than_nominal() {
-    let chain = chain();
+    let chain = kr6();
     let nominal_robot = Robot::nominal(chain.clone());
     let (mut independent, mut everywhere, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
     for seed in 1..=SEEDS {
@@ -143,7 +138,7 @@ fn some_series(chain: &Chain, count: usize, stops: usize, seed: u64) -> (Vec<Mea
 
 /// Error of the flange, root mean square over the seeds: of the quiet series, and of all.
 fn without_and_with(seeds: std::ops::RangeInclusive<u64>, count: usize, stops: usize) -> [f64; 2] {
-    let chain = chain();
+    let chain = kr6();
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
     let mut squares = [0.0; 2];
     for seed in seeds {

@@ -1,5 +1,6 @@
 //! Series that belong to another robot, or whose camera stands elsewhere than series.toml says, are refused by name.
 
+use crate::robots::kr6;
 use robotcal::assess::WorkspacePoint;
 use robotcal::diagnose::Finding;
 use robotcal::geom::Pose;
@@ -10,12 +11,6 @@ use robotcal::simulate::{WorldRequest, series};
 use robotcal::study::measured;
 use robotcal::urdf::Chain;
 use robotcal::{Code, Error};
-use std::path::Path;
-
-fn chain() -> Chain {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap()
-}
 
 fn request(chain: &Chain) -> WorldRequest {
     let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
@@ -40,7 +35,7 @@ fn diagnosis(chain: Chain, series: MeasuredSeries) -> Error {
 
 #[test]
 fn a_larger_robot_of_the_same_build_is_named() {
-    let right = chain();
+    let right = kr6();
     let series = seen(&right);
     let mut larger = right;
     // The forearm of the long version of the arm.
@@ -55,7 +50,7 @@ fn a_larger_robot_of_the_same_build_is_named() {
 /// They turn nothing, and look like other link lengths.
 #[test]
 fn zeros_of_parallel_joints_that_cancel_are_found() {
-    let chain = chain();
+    let chain = kr6();
     let world = WorldRequest { images: 24, ..request(&chain) };
     let mut series = measured(&series(&world).unwrap(), &chain);
     let off = 15f64.to_radians();
@@ -73,7 +68,7 @@ fn zeros_of_parallel_joints_that_cancel_are_found() {
 
 #[test]
 fn the_size_of_a_plate_that_does_not_fit_is_told() {
-    let chain = chain();
+    let chain = kr6();
     for factor in [0.9, 1.15] {
         let mut series = seen(&chain);
         series.plate.pitch_m *= factor;
@@ -102,7 +97,7 @@ fn said_of_rows(chain: &Chain, of: impl Fn(usize) -> usize) -> (Error, Vec<Strin
 
 #[test]
 fn rows_that_are_shifted_from_an_image_on_are_told_from_a_shift_of_all() {
-    let chain = chain();
+    let chain = kr6();
     // A row was lost, a row was written twice, and one half was turned by a row.
     let lost = |k: usize| if k < 8 { k } else { k + 1 };
     let twice = |k: usize| if k < 5 { k } else { k - 1 };
@@ -123,7 +118,7 @@ fn rows_that_are_shifted_from_an_image_on_are_told_from_a_shift_of_all() {
 
 #[test]
 fn joints_that_were_not_read_any_more_are_named_in_a_short_series() {
-    let chain = chain();
+    let chain = kr6();
     let frozen = |joints: std::ops::Range<usize>| {
         let mut series = seen(&chain);
         series.stops.truncate(9);
@@ -140,7 +135,7 @@ fn joints_that_were_not_read_any_more_are_named_in_a_short_series() {
 
 #[test]
 fn a_joint_that_reads_the_same_at_all_stops_is_named() {
-    let chain = chain();
+    let chain = kr6();
     for joint in [0, 1] {
         let mut series = seen(&chain);
         let first = series.stops[0].readings.as_ref().unwrap()[joint];
@@ -154,7 +149,7 @@ fn a_joint_that_reads_the_same_at_all_stops_is_named() {
 
 #[test]
 fn an_exchanged_camera_mount_is_named() {
-    let chain = chain();
+    let chain = kr6();
     let mut series = seen(&chain);
     series.mount = CameraMount::Fixed;
     let said = diagnosis(chain, series);
@@ -165,7 +160,7 @@ fn an_exchanged_camera_mount_is_named() {
 /// A detector that does not know that the pictures are mirrored gives ids from the other side of a plate that looks the same from there.
 #[test]
 fn mirrored_and_transposed_images_are_named() {
-    let chain = chain();
+    let chain = kr6();
     for is_transposed in [false, true] {
         let mut series = seen(&chain);
         let (width_px, columns) = (f64::from(series.width_px), series.plate.columns);
@@ -187,7 +182,7 @@ fn mirrored_and_transposed_images_are_named() {
 
 #[test]
 fn mistakes_in_single_columns_are_named() {
-    let chain = chain();
+    let chain = kr6();
     let with = |change: &dyn Fn(&mut Vec<f64>)| {
         let mut series = seen(&chain);
         series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(change);
@@ -215,7 +210,7 @@ fn mistakes_in_single_columns_are_named() {
 
 #[test]
 fn images_that_fit_the_robot_found_are_not_left_out_for_missing_the_nominal_one() {
-    let chain = chain();
+    let chain = kr6();
     let mut series = seen(&chain);
     // Mastering off by five degrees: some images miss the nominal robot by far more than others.
     series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| q[1] += 5f64.to_radians());
@@ -228,7 +223,7 @@ fn images_that_fit_the_robot_found_are_not_left_out_for_missing_the_nominal_one(
 
 /// Images that are left out, and circles of rows that are named, where the readings of some rows stand in others.
 fn left_out_and_named(joint_noise_rad: f64, moved: &[(usize, usize)]) -> (Vec<usize>, Vec<Vec<usize>>) {
-    let chain = chain();
+    let chain = kr6();
     let world = WorldRequest { images: 24, joint_noise_rad, ..request(&chain) };
     let mut series = measured(&series(&world).unwrap(), &chain);
     let given: Vec<_> = series.stops.iter().map(|s| s.readings.clone()).collect();
@@ -256,7 +251,7 @@ fn rows_that_were_exchanged_are_named_with_one_another() {
 
 /// 24 images beside which a tracker saw the tip, with the images that `of` gives to each stop by its place.
 fn beside_a_tracker(of: impl Fn(usize) -> usize) -> Result<Vec<Finding>, Error> {
-    let chain = chain();
+    let chain = kr6();
     let world = WorldRequest { images: 24, ..request(&chain) };
     let mut series = measured(&series(&world).unwrap(), &chain);
     let robot = identify(chain.clone(), std::slice::from_ref(&series), &Options::default()).unwrap().exported_robot();
@@ -298,7 +293,7 @@ fn images_are_blamed_for_their_rows_where_a_tracker_fits_the_readings() {
 
 #[test]
 fn what_cost_half_of_the_images_is_said_beside_their_number() {
-    let chain = chain();
+    let chain = kr6();
     let world = WorldRequest { images: 24, ..request(&chain) };
     let mut series = measured(&series(&world).unwrap(), &chain);
     for stop in series.stops.iter_mut().step_by(2) {
@@ -316,7 +311,7 @@ fn what_cost_half_of_the_images_is_said_beside_their_number() {
 
 #[test]
 fn joints_that_never_moved_do_not_make_the_others_uncertain() {
-    let chain = chain();
+    let chain = kr6();
     let from = seen(&chain).stops[0].readings.clone().unwrap();
     // The wrist turns about a stop of the usual world; the arm stands still.
     let turned = |k: usize| {
@@ -342,7 +337,7 @@ fn joints_that_never_moved_do_not_make_the_others_uncertain() {
 
 #[test]
 fn views_straight_at_the_plate_do_not_determine_the_camera_and_some_tilted_ones_do() {
-    let chain = chain();
+    let chain = kr6();
     let mut straight = request(&chain);
     (straight.views.tilt_rad, straight.views.aside_rad, straight.views.near_m) = (0.0, 0.0, 0.3);
     straight.pixel_sigma_px = 0.05;
@@ -366,7 +361,7 @@ fn views_straight_at_the_plate_do_not_determine_the_camera_and_some_tilted_ones_
 /// Ids that are read along the wrong side of the plate look like a mirror, and fit a plane with the two counts exchanged.
 #[test]
 fn columns_and_rows_of_a_plate_that_were_exchanged_are_named() {
-    let chain = chain();
+    let chain = kr6();
     let request = WorldRequest { plate: Plate::lattice(PlateKind::Points, 11, 8, 0.025, 0.05e-3), ..request(&chain) };
     let mut series = measured(&series(&request).unwrap(), &chain);
     series.plate = Plate::lattice(PlateKind::Points, 8, 11, 0.025, 0.05e-3);

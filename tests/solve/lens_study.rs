@@ -1,8 +1,8 @@
 //! How often the evidence takes another lens than the one that made the images, and what that does to the flange.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
+use crate::robots::kr6_to_link_6;
 use rayon::prelude::*;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::linalg::SymmetricFactor;
@@ -11,12 +11,6 @@ use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::problem::{LensChoice, MeasuredSeries};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::study::{flange_error, measured};
-use robotcal::urdf::{Chain, read};
-
-fn chain() -> Chain {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    read(&path).unwrap().chain(Some("base_link"), Some("link_6")).unwrap()
-}
 
 fn world(lens: Lens, images: usize, joint_noise_rad: f64, seed: u64) -> SimulatedSeries {
     let plate = design(&PlateRequest { markers: Some(60), ..PlateRequest::default() }).unwrap().plate;
@@ -29,20 +23,20 @@ fn world(lens: Lens, images: usize, joint_noise_rad: f64, seed: u64) -> Simulate
         plate_modes: true,
         held_out: 1,
         seed,
-        ..WorldRequest::typical(chain(), plate)
+        ..WorldRequest::typical(kr6_to_link_6(), plate)
     };
     series(&request).unwrap()
 }
 
 /// The lens taken of one that is open, and the normalised squared error of a flange pose with it and with `brown`, per degree of freedom.
 fn taken(made: &SimulatedSeries) -> Option<(Lens, f64, f64)> {
-    let seen = measured(made, &chain());
+    let seen = measured(made, &kr6_to_link_6());
     let options = Options { model: RobotModel::Full, ..Options::default() };
     let by = |lens_choice: LensChoice| {
-        identify(chain(), &[MeasuredSeries { lens: Lens::Brown, lens_choice, ..seen.clone() }], &options).ok()
+        identify(kr6_to_link_6(), &[MeasuredSeries { lens: Lens::Brown, lens_choice, ..seen.clone() }], &options).ok()
     };
     let normalised = |s: &Solution| {
-        let (error, covariance) = flange_error(s, made, &made.truth.robot(&chain()).unwrap())?;
+        let (error, covariance) = flange_error(s, made, &made.truth.robot(&kr6_to_link_6()).unwrap())?;
         let factor = SymmetricFactor::new(&covariance).ok()?;
         Some(error.dot(&factor.solve(&error)) / 6.0)
     };

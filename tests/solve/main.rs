@@ -4,6 +4,8 @@
 
 #[path = "../outputs_support/mod.rs"]
 mod outputs_support;
+#[path = "../support/robots.rs"]
+mod robots;
 #[path = "../said/mod.rs"]
 mod said;
 #[path = "../support/mod.rs"]

@@ -1,7 +1,6 @@
 //! How far the markers are off is, on request, a variance component beside image noise and joint noise, where the data tell it.
 
-use std::path::Path;
-
+use crate::robots::kr6_urdf;
 use robotcal::identify::{MarkerTolerance, Options, RobotModel, Solution, identify};
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{WorldRequest, series};
@@ -13,7 +12,7 @@ const JOINT_NOISE_RAD: f64 = 0.05e-3;
 /// Robot, camera and a plate whose markers are off by `marker_sigma_m`, where `STATED_M` is stated.
 fn identified((columns, rows): (u32, u32), marker_sigma_m: f64, seed: u64) -> Solution {
     println!("seed {seed}");
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let chain = robotcal::urdf::read(&urdf).unwrap().chain(None, Some("link_6")).unwrap();
     let plate = Plate::lattice(PlateKind::Points, columns, rows, 0.27 / f64::from(columns - 1), STATED_M);
     let wanted = WorldRequest {

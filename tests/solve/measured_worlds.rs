@@ -1,15 +1,14 @@
 //! Simulated robots that a tracker or sockets measure, with known truth.
 
-use std::path::Path;
-
 use nalgebra::{Vector3, Vector6};
 use robotcal::assess::{MeasuredPoint, fit_points};
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{BodySeen, InstrumentKind, MeasuredSeries, MeasuredStop, SeenBody, SeenLength};
-use robotcal::urdf::{self, Chain};
+use robotcal::urdf::Chain;
 
+use crate::robots::kr6;
 use crate::support::small::Dice;
 
 /// What measures, and how well.
@@ -28,8 +27,7 @@ pub struct World {
 }
 
 pub fn chain() -> Chain {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    urdf::read(&urdf).unwrap().chain(None, None).unwrap()
+    kr6()
 }
 
 pub fn stop(k: usize, readings: Vec<f64>) -> MeasuredStop {

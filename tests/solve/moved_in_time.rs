@@ -14,28 +14,23 @@ use robotcal::problem::{ImageRejection, LensChoice, MeasuredSeries, Problem};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::study::measured;
-use robotcal::urdf::Chain;
 use std::path::Path;
 
+use crate::robots::kr6;
 use crate::support::displaced::change;
 use crate::support::small::{Dice, Request, problem};
 
 const RADIUS_M: f64 = 0.01;
 
-fn chain() -> Chain {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap()
-}
-
 fn seen(mount: CameraMount, images: usize, seed: u64) -> SimulatedSeries {
     let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.03e-3);
     plate.markers.iter_mut().for_each(|m| m.outer_radius_m = RADIUS_M);
-    let request = WorldRequest { mount, images, least_markers: 12, seed, ..WorldRequest::typical(chain(), plate) };
+    let request = WorldRequest { mount, images, least_markers: 12, seed, ..WorldRequest::typical(kr6(), plate) };
     series(&request).unwrap()
 }
 
 fn solved(series: &SimulatedSeries) -> Solution {
-    let chain = chain();
+    let chain = kr6();
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
     identify(chain.clone(), &[measured(series, &chain)], &options).unwrap()
 }
@@ -162,7 +157,7 @@ fn a_plate_and_a_camera_that_creep_are_not_called_moved_once() {
 fn a_zero_that_creeps_is_not_called_mastered_anew() {
     const MOST_RAD: f64 = 0.5e-3;
     for (seed, joint) in [(11, 1), (12, 3)] {
-        let chain = chain();
+        let chain = kr6();
         let mut series = measured(&seen(CameraMount::Hand, 30, seed), &chain);
         for (k, stop) in series.stops.iter_mut().enumerate() {
             stop.readings.as_mut().unwrap()[joint] -= MOST_RAD * k as f64 / 29.0;
@@ -185,7 +180,7 @@ fn stated_noise_is_no_misfit_of_the_camera() {
         least_markers: 12,
         seed: 13,
         pixel_sigma_px: 1.0,
-        ..WorldRequest::typical(chain(), plate)
+        ..WorldRequest::typical(kr6(), plate)
     };
     let solution = solved(&series(&request).unwrap());
     let misfit = solution.findings.iter().find(|f| f.code() == Code::CameraModelMisfit);
@@ -250,7 +245,7 @@ fn few_stops_of_a_robot_of_many_parameters_are_not_accused() {
 /// Its numbers.
 fn assert_named(series: &MeasuredSeries, code: Code, names: &[&str]) -> Vec<Quantity> {
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
-    let (said, quantities) = match identify(chain(), std::slice::from_ref(series), &options) {
+    let (said, quantities) = match identify(kr6(), std::slice::from_ref(series), &options) {
         Err(refusal) => {
             assert_eq!(refusal.code, code, "{refusal}");
             (refusal.to_string(), refusal.quantities)
@@ -270,7 +265,7 @@ fn assert_named(series: &MeasuredSeries, code: Code, names: &[&str]) -> Vec<Quan
 #[test]
 fn what_breaks_a_series_is_named() {
     let made = seen(CameraMount::Hand, 24, 3);
-    let good = measured(&made, &chain());
+    let good = measured(&made, &kr6());
     for from in [12, 18] {
         let first = good.stops[from].image.as_str();
         let joint = |change: &dyn Fn(&mut Vec<f64>)| {
@@ -283,7 +278,7 @@ fn what_breaks_a_series_is_named() {
         let moved = |by: &dyn Fn(Pose) -> Pose| {
             let mut series = made.clone();
             change(&mut series, from..24, by);
-            measured(&series, &chain())
+            measured(&series, &kr6())
         };
         let pushed = Pose::exp(&Vector6::new(0.03, 0.02, 0.0, 0.0, 0.0, 0.5));
         assert_named(&moved(&|pose| pose * pushed), Code::PlateMoved, &[first]);
@@ -352,7 +347,7 @@ fn images_that_are_turned_are_no_moved_camera() {
         for image in &mut turned.observations[from..] {
             image.observations.iter_mut().for_each(|o| o.uv = [2.0 * cx - o.uv[0], 2.0 * cy - o.uv[1]]);
         }
-        let series = measured(&turned, &chain());
+        let series = measured(&turned, &kr6());
         let told = assert_named(&series, Code::ImagesTurned, &[series.stops[from].image.as_str()]);
         let turn = told.iter().find(|q| q.name == "turn").unwrap().value;
         assert!((turn - std::f64::consts::PI).abs() < 1e-9, "{told:?}");

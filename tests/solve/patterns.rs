@@ -1,7 +1,6 @@
 //! Patterns in the residuals: named where they are, not where they are not, and by what removes them.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -14,8 +13,8 @@ use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::problem::{LensChoice, MeasuredSeries};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::study::measured;
-use robotcal::urdf::{Chain, read};
 
+use crate::robots::kr6_to_link_6;
 use crate::support::flange::{flange_of, true_from_fitted};
 
 /// What is put in, and how much of it.
@@ -66,11 +65,6 @@ impl Fault {
     }
 }
 
-fn chain() -> Chain {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    read(&path).unwrap().chain(Some("base_link"), Some("link_6")).unwrap()
-}
-
 /// A world whose fault the fit does not know of: 30 stops, 60 markers stated to 0.03 mm.
 fn world(fault: Fault, seed: u64) -> SimulatedSeries {
     let mut plate = design(&PlateRequest { markers: Some(60), ..PlateRequest::default() }).unwrap().plate;
@@ -90,13 +84,13 @@ fn world(fault: Fault, seed: u64) -> SimulatedSeries {
         pixel_sigma_px: 0.02,
         held_out: 1,
         seed,
-        ..WorldRequest::typical(chain(), plate)
+        ..WorldRequest::typical(kr6_to_link_6(), plate)
     };
     SimulatedSeries { plate: stated, ..series(&request).unwrap() }
 }
 
 fn seen(made: &SimulatedSeries) -> MeasuredSeries {
-    MeasuredSeries { lens: Lens::Brown, lens_choice: LensChoice::Settled, ..measured(made, &chain()) }
+    MeasuredSeries { lens: Lens::Brown, lens_choice: LensChoice::Settled, ..measured(made, &kr6_to_link_6()) }
 }
 
 #[test]
@@ -130,7 +124,7 @@ fn a_pattern_is_named_by_its_cause_and_none_where_there_is_none() {
 fn of_steps_that_take_more_than_there_is_the_simplest_names_the_cause() {
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
     for seed in [2, 13] {
-        let solution = identify(chain(), &[seen(&world(Fault::ThinPrism(2e-2), seed))], &options).unwrap();
+        let solution = identify(kr6_to_link_6(), &[seen(&world(Fault::ThinPrism(2e-2), seed))], &options).unwrap();
         let found = residual_pattern(&solution.fit, &Limits::default()).unwrap().found;
         assert!(found.statistic.is_finite() && found.rms_px.is_finite() && found.share > 0.9, "seed {seed}: {found:?}");
         assert_eq!(found.pattern, Pattern::ThinPrism, "seed {seed}");
@@ -171,7 +165,7 @@ fn outcome(fault: Fault, seed: u64) -> Option<Outcome> {
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
     let solved = |fault: Fault| {
         let made = world(fault, seed);
-        Some((identify(chain(), &[seen(&made)], &options).ok()?, made))
+        Some((identify(kr6_to_link_6(), &[seen(&made)], &options).ok()?, made))
     };
     let (faulty, bent) = solved(fault)?;
     let found = residual_pattern(&faulty.fit, &Limits::default());

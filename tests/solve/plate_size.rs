@@ -1,7 +1,6 @@
 //! A plate that is not of the size that its file states: the robot would take the error over, so that it must be named.
 
-use std::path::Path;
-
+use crate::robots::kr6;
 use nalgebra::Vector3;
 use robotcal::Code;
 use robotcal::diagnose::Finding;
@@ -12,11 +11,6 @@ use robotcal::series::{Plate, PlateKind, ScaleBar};
 use robotcal::simulate::{WorldRequest, series};
 use robotcal::study::measured;
 use robotcal::urdf::Chain;
-
-fn chain() -> Chain {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
-    robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap()
-}
 
 fn request(chain: &Chain) -> WorldRequest {
     let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
@@ -31,7 +25,7 @@ fn seen(chain: &Chain) -> (MeasuredSeries, Vec<[f64; 3]>) {
 
 /// The solution where the file states a plate larger by these factors along x and y, with a distance measured on the plate as it is.
 fn stated(x: f64, y: f64, bar: Option<(u32, u32)>) -> Solution {
-    let chain = chain();
+    let chain = kr6();
     let (mut series, errors) = seen(&chain);
     series.plate.scale = bar.map(|(from, to)| {
         let index = |id| series.plate.index_of(id).unwrap();
@@ -94,7 +88,7 @@ fn a_plate_that_a_printer_stretched_is_doubted_and_a_measured_distance_mends_it_
 /// The wrist alone turns: its links are short, and say next to nothing of the size of the plate.
 #[test]
 fn a_wrist_alone_doubts_no_plate() {
-    let chain = chain();
+    let chain = kr6();
     let from = seen(&chain).0.stops[0].readings.clone().unwrap();
     for seed in 1..6 {
         let turned = |k: usize| {
@@ -111,7 +105,7 @@ fn a_wrist_alone_doubts_no_plate() {
 /// Poses that count as independent know nothing of the size that they have in common.
 #[test]
 fn a_two_stage_result_states_what_is_not_known_of_the_size_of_the_plate() {
-    let chain = chain();
+    let chain = kr6();
     let (mut series, _) = seen(&chain);
     let sigma = |series: &MeasuredSeries, estimator| {
         let options = Options { estimator, ..Options::default() };
@@ -138,7 +132,7 @@ fn a_two_stage_result_states_what_is_not_known_of_the_size_of_the_plate() {
 /// Ink spreads: circles are larger than stated, and tell nothing of the size of the plate.
 #[test]
 fn circles_of_other_radii_doubt_no_plate() {
-    let chain = chain();
+    let chain = kr6();
     let solved = |gain_m: f64| {
         let (mut series, _) = seen(&chain);
         series.plate.markers.iter_mut().for_each(|m| m.outer_radius_m -= gain_m);
@@ -163,7 +157,7 @@ fn circles_of_other_radii_doubt_no_plate() {
 fn what_links_say_of_the_size_of_a_plate_is_as_sure_as_stated() {
     let (mut sum, mut count) = (0.0, 0.0);
     for seed in 1..7 {
-        let chain = chain();
+        let chain = kr6();
         let world = series(&WorldRequest { images: 40, seed, ..request(&chain) }).unwrap();
         let mut stated = measured(&world, &chain);
         stated.plate.markers.iter_mut().for_each(|m| {

@@ -1,7 +1,8 @@
 //! Three real series of one robot, judged by points that a laser tracker measured on it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use crate::robots::shared;
 use nalgebra::Vector3;
 use robotcal::assess::{Limits, MeasuredPoint, fit_points, folds, predict_image, refitted};
 use robotcal::identify::{Estimator, JointNoise, Options, PoseStage, Solution, fit_poses, identify, measure};
@@ -15,15 +16,6 @@ const SERIES: [&str; 3] = ["nachi-2025-01-17", "nachi-2025-02-04", "nachi-2025-0
 
 /// Error of a laser tracker on points of a machine's reach, per axis, m.
 const DEVICE_M: f64 = 0.03e-3;
-
-fn real() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/real");
-    if !folder.exists() {
-        println!("skipped: {} is not there", folder.display());
-        return None;
-    }
-    Some(folder)
-}
 
 fn tracker_points(path: &Path) -> Vec<MeasuredPoint> {
     let mut reader = csv::Reader::from_path(path).unwrap();
@@ -69,7 +61,7 @@ fn judged(s: &Solution, points: &[MeasuredPoint]) -> Judged {
 #[test]
 #[ignore = "a study of minutes: every choice of real series with one lens and with that of the evidence, by RMS and by density on the tracker"]
 fn study_of_series_on_the_tracker() {
-    let Some(real) = real() else { return };
+    let real = shared("real");
     let singles = (0..3).map(|k| vec![SERIES[k]]);
     let pairs = [[0, 1], [0, 2], [1, 2]].map(|p| p.map(|k| SERIES[k]).to_vec());
     let nachi: Vec<Vec<&str>> = singles.chain(pairs).chain([SERIES.to_vec()]).collect();
@@ -115,8 +107,9 @@ fn study_of_series_on_the_tracker() {
 }
 
 #[test]
+#[ignore = "needs the real series"]
 fn the_tracker_confirms_model_and_stated_uncertainty() {
-    let Some(real) = real() else { return };
+    let real = shared("real");
     println!(
         "| series | model: stated mm | found mm | ratio | expected at the points, mm | ratio | URDF alone: stated mm | found mm | ratio | the other URDF without compensation: stated mm | found mm | ratio |\n|---|---|---|---|---|---|---|---|---|---|---|---|"
     );
@@ -225,7 +218,7 @@ fn held_out_mm(adjustment: &Adjustment, fit: impl Fn(Adjustment) -> Option<State
 #[test]
 #[ignore = "minutes; its figures stand in the guide, decision 7"]
 fn parts_of_the_noise_model_switched_off() {
-    let Some(real) = real() else { return };
+    let real = shared("real");
     for (name, tracker) in SERIES
         .map(|s| (s, "tracker-nachi-2025-01-15.csv"))
         .into_iter()

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use crate::robots::kr6_urdf;
 use serde_json::Value;
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
@@ -23,7 +24,7 @@ fn codes(record: &Value) -> Vec<&str> {
 #[test]
 fn from_its_own_file_a_result_is_solved_again_bit_for_bit_with_its_own_options() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let urdf = root.join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let series = root.join("datasets/bad/image-of-other-size");
     let (urdf, series) = (urdf.to_str().unwrap(), series.to_str().unwrap());
     let folder = tempfile::tempdir().unwrap();

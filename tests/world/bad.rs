@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::robots::kr6_urdf;
 use robotcal::Code;
 use robotcal::output::solution_json;
 use robotcal::problem::ImageRejection;
@@ -30,7 +31,7 @@ fn code_of_error(text: &str) -> Option<Code> {
 fn identify(series: &Path, out: &Path) -> Answer {
     let output = Command::new(env!("CARGO_BIN_EXE_robotcal"))
         .args(["identify", "--urdf"])
-        .arg(root().join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"))
+        .arg(kr6_urdf())
         .arg("--series")
         .arg(series)
         .arg("--out")

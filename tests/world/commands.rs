@@ -4,17 +4,11 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use crate::program::{robotcal, text};
+use crate::robots::{KR6, kr6_urdf};
 use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::series::{Plate, read_plate};
-
-fn robotcal(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).output().unwrap()
-}
-
-fn text(output: &Output) -> String {
-    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
-}
 
 fn plate(folder: &Path, args: &[&str]) -> (Output, Option<Plate>) {
     let out = folder.join("plate");
@@ -165,7 +159,7 @@ fn a_folder_of_results_stands_for_its_solution() {
 
 #[test]
 fn what_is_no_series_is_said_to_be_none() {
-    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = root(KR6);
     for [robot, series] in [[&root("datasets/kr6_small"), &urdf], [&urdf, &root("datasets")]] {
         let output = robotcal(&["identify", "--urdf", robot, "--series", series]);
         assert_eq!(output.status.code(), Some(2));
@@ -181,7 +175,7 @@ fn doctor_names_all_that_is_missing_at_once() {
     let output = robotcal(&["doctor", run.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(2));
     assert_says(&text(&output), Code::FileMissing, &["series.toml", "plate.toml", "joints.csv", "images"]);
-    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = root(KR6);
     let complete = robotcal(&["doctor", &root("datasets/kr6_small"), "--urdf", &urdf]);
     assert_eq!(complete.status.code(), Some(0), "{}", text(&complete));
     let unknown = robotcal(&["doctor", &root("datasets/bad/unknown-joint"), "--urdf", &urdf]);
@@ -263,7 +257,7 @@ fn the_folder_of_predicted_flanges_is_made() {
 
 #[test]
 fn a_dry_run_says_all_that_it_counts() {
-    let (urdf, run) = (root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"), root("datasets/bad/too-few-images"));
+    let (urdf, run) = (root(KR6), root("datasets/bad/too-few-images"));
     let output = robotcal(&["identify", "--dry-run", "--robot-model", "full", "--urdf", &urdf, "--series", &run]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output));
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -292,7 +286,7 @@ fn all_flags_that_a_board_lacks_are_named_at_once() {
 #[test]
 fn boards_that_cannot_be_drawn_are_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
-    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = root(KR6);
     let common = "format = 1\ncolumns = 9\nrows = 6\npitch_m = 0.03\ntolerance_m = 0.0001\n";
     for kind in ["charuco", "circle-grid"] {
         let plate = folder.path().join(format!("{kind}.toml"));
@@ -333,7 +327,7 @@ fn too_few_targets_of_a_plan_are_refused() {
         ),
     )
     .unwrap();
-    let (urdf, out) = (root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"), folder.path().join("plan"));
+    let (urdf, out) = (root(KR6), folder.path().join("plan"));
     let plate = folder.path().join("plate/plate.toml");
     let output = robotcal(&[
         "plan",
@@ -354,7 +348,7 @@ fn too_few_targets_of_a_plan_are_refused() {
 #[test]
 fn limits_in_degrees_are_refused_where_a_robot_is_to_be_moved() {
     let folder = tempfile::tempdir().unwrap();
-    let text_of = std::fs::read_to_string(root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf")).unwrap();
+    let text_of = std::fs::read_to_string(root(KR6)).unwrap();
     let limit = text_of.match_indices("lower=\"").last().unwrap().0;
     let (before, behind) = text_of.split_at(limit);
     let degrees = behind.split_once("/>").unwrap().1;
@@ -396,7 +390,7 @@ fn bytes_that_are_no_text_are_taken_in_paths_and_refused_in_names_at_once() {
 
     let shipped = |path: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
-    command.arg("identify").arg("--urdf").arg(shipped("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"));
+    command.arg("identify").arg("--urdf").arg(shipped(KR6));
     command.arg("--series").arg(folder.path().join("missing_series")).arg("--out").arg(&none);
     command.arg("--fix").arg(OsStr::from_bytes(b"joint_1\xff.offset"));
     let output = command.output().unwrap();
@@ -412,7 +406,7 @@ fn a_recording_that_cannot_be_written_is_refused_before_the_work() {
     let at = |name: &str| folder.path().join(name).display().to_string();
     std::fs::write(at("file"), "mine").unwrap();
     std::fs::write(at("old.mcap"), "mine").unwrap();
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     for (to, named) in [("file/run.mcap", "file"), ("old.mcap", "old.mcap")] {
         let output = robotcal(&["convert", &at("missing_series"), &at(to), "--urdf", urdf.to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(2));
@@ -461,7 +455,7 @@ fn a_series_of_two_placements_makes_no_recording() {
     }
     let joints = std::fs::read_to_string(dataset.join("joints.csv")).unwrap();
     let rows: Vec<&str> = joints.lines().take(3).collect();
-    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = root(KR6);
     for (second, status) in [("a", 0), ("b", 2)] {
         let placed: String =
             rows.iter().zip(["placement", "a", second]).map(|(row, p)| format!("{row},{p}\n")).collect();
@@ -507,7 +501,7 @@ fn tags_of_another_size_beside_their_distance_are_named() {
         &plate,
     ]);
     assert!(drawn.status.success(), "{}", text(&drawn));
-    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = root(KR6);
     let seen = ["--plate", &file, "--observations", "--images", "12", "--held-out", "0", "--out", &series];
     let simulated = robotcal(&[&["simulate", "--urdf", &urdf][..], &seen].concat());
     assert!(simulated.status.success(), "{}", text(&simulated));
@@ -528,7 +522,7 @@ fn tags_of_another_size_beside_their_distance_are_named() {
 #[test]
 fn a_loose_camera_is_named_also_where_the_joint_noise_is_stated() {
     let repo = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let (urdf, series) = (repo.join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf"), repo.join("datasets/bad/loose-camera"));
+    let (urdf, series) = (kr6_urdf(), repo.join("datasets/bad/loose-camera"));
     let folder = tempfile::tempdir().unwrap();
     let [urdf, series, out] =
         [&urdf, &series, &folder.path().join("out")].map(|path| path.to_str().unwrap().to_owned());

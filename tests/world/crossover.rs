@@ -1,12 +1,11 @@
 //! The study of joint against two-step calibration.
 
-use std::path::Path;
-
+use crate::robots::kr6_urdf;
 use robotcal::study::{StudyRequest, study};
 
 #[test]
 fn joint_noise_in_the_model_is_worth_most_where_the_robot_is_noisy() {
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let chain = robotcal::urdf::read(&urdf).unwrap().chain(None, None).unwrap();
     let request = StudyRequest {
         seeds: 4,

@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::robots::KR6;
 use robotcal::simulate::faults::FAULTS;
 use serde_json::Value;
 
@@ -147,7 +148,7 @@ fn reads_alike(a: &str, b: &str) -> bool {
 }
 
 fn kr6() -> PathBuf {
-    PathBuf::from("robots/kuka_kr6_r900/kuka_kr6_r900.urdf")
+    PathBuf::from(KR6)
 }
 
 #[test]
@@ -179,7 +180,7 @@ fn series_that_come_with_the_program_are_solved_as_before() {
 }
 
 #[test]
-#[ignore = "needs ../shared/real"]
+#[ignore = "needs the real series"]
 fn real_series_are_solved_as_before() {
     let names = ["nachi-2025-01-17", "nachi-2025-02-04", "nachi-2025-02-19", "aubo-2024-12-16"];
     let folder = |name: &str| Path::new("../shared/real").join(name);

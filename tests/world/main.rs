@@ -8,7 +8,11 @@ mod commands;
 mod crossover;
 mod golden;
 mod poses_report;
+#[path = "../support/command.rs"]
+mod program;
 mod render;
+#[path = "../support/robots.rs"]
+mod robots;
 #[path = "../said/mod.rs"]
 mod said;
 mod series;

@@ -2,18 +2,15 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::process::{Command, Output};
 
+use crate::program::robotcal;
+use crate::robots::kr6_urdf;
 use robotcal::Code;
-
-fn robotcal(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).output().unwrap()
-}
 
 /// A simulated series of that many images, with a lens, as observations.
 fn simulated(folder: &Path, images: usize, lens: &str) -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let urdf = root.join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let plate = root.join("datasets/kr6_small/plate.toml");
     let series = folder.join("run 1").display().to_string();
     let [urdf, plate] = [&urdf, &plate].map(|path| path.to_str().unwrap());

@@ -1,0 +1,39 @@
+//! Robots that come with the repository, and the real series beside it.
+
+#![allow(dead_code)]
+
+use std::path::{Path, PathBuf};
+
+use robotcal::urdf::{Chain, read};
+
+/// The KUKA KR 6 in the repository.
+pub const KR6: &str = "robots/kuka_kr6_r900/kuka_kr6_r900.urdf";
+
+/// A file of the repository.
+pub fn repo(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+pub fn kr6_urdf() -> PathBuf {
+    repo(KR6)
+}
+
+/// The KR 6 from its root to its tip.
+pub fn kr6() -> Chain {
+    read(&kr6_urdf()).unwrap().chain(None, None).unwrap()
+}
+
+pub fn kr6_to_link_6() -> Chain {
+    read(&kr6_urdf()).unwrap().chain(Some("base_link"), Some("link_6")).unwrap()
+}
+
+pub fn ur10e() -> Chain {
+    read(&repo("robots/ur10e/ur10e.urdf")).unwrap().chain(Some("base_link"), Some("tool0")).unwrap()
+}
+
+/// A folder of measured data or descriptions, which lie beside the repository: tests that need them are ignored.
+pub fn shared(folder: &str) -> PathBuf {
+    let path = repo("../shared").join(folder);
+    assert!(path.is_dir(), "{} is not there", path.display());
+    path
+}
