@@ -1,11 +1,10 @@
 //! Files that are given together, in whatever order: data and routines of one name in several of them.
 
-use crate::changing::{START, beside, pose_text};
-use crate::not_told::{script_pose, told};
+use crate::programs_support::text::{
+    NO_AXES, START, UNCHECKED, beside, pose_text, robtarget as written, script_pose, told,
+};
 use crate::programs_support::{Cell, status_turn};
 use robotcal::programs::LeftReason;
-
-const NO_AXES: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
 
 fn degrees(q: &[f64]) -> Vec<f64> {
     q.iter().map(|v| v.to_degrees()).collect()
@@ -13,9 +12,7 @@ fn degrees(q: &[f64]) -> Vec<f64> {
 
 /// A robtarget of the flange whose confdata count for nothing.
 fn robtarget(cell: &Cell, q: &[f64]) -> String {
-    let pose = cell.nominal.base_from_tip(q);
-    let ([x, y, z], [i, j, k, w]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
-    format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{k:.9}],[0,0,0,0],{NO_AXES}]")
+    written(&cell.nominal.base_from_tip(q), UNCHECKED)
 }
 
 /// The texts of files after correction, and what became of their targets.

@@ -1,24 +1,9 @@
 //! Programs whose targets are not the same each time, or not where a reader from top to bottom would have them.
 
+use crate::programs_support::text::{START, UNCHECKED, beside, pose_text, robtarget, told_beside_first as told};
 use crate::programs_support::{Cell, assert_brings_to, krl_frame, numbers, status_turn};
 use robotcal::geom::{Pose, log_so3};
 use robotcal::programs::LeftReason;
-
-/// A posture away from singular ones, rad.
-pub(super) const START: [f64; 6] = [0.17, -1.4, 1.7, 0.35, 0.7, 0.5];
-
-/// A little beside it.
-pub(super) fn beside(k: usize) -> Vec<f64> {
-    START.iter().enumerate().map(|(i, q)| q + 0.02 * ((7 * k + i) as f64).sin()).collect()
-}
-
-/// Components X to C of the flange.
-pub(super) fn pose_text(cell: &Cell, q: &[f64]) -> String {
-    let pose = cell.nominal.base_from_tip(q);
-    let [c, b, a] = pose.rpy().map(f64::to_degrees);
-    let [x, y, z] = pose.xyz().map(|v| 1e3 * v);
-    format!("X {x:.5},Y {y:.5},Z {z:.5},A {a:.7},B {b:.7},C {c:.7}")
-}
 
 /// `@` stands for a new pose each time, `#` for the axes of the first.
 fn krl(cell: &Cell, body: &str) -> String {
@@ -29,15 +14,6 @@ fn krl(cell: &Cell, body: &str) -> String {
         text.replace_range(at..=at, &format!("{{{}}}", pose_text(cell, &beside(k))));
     }
     text
-}
-
-/// Targets that were corrected beside the first, and the reasons of those that were left.
-pub(super) fn told(cell: &Cell, files: &[(&str, String)], flags: &[&str]) -> (usize, Vec<String>) {
-    let paths: Vec<_> = files.iter().map(|(name, text)| cell.write(name, text.as_bytes())).collect();
-    let run = cell.compensate(&paths.iter().collect::<Vec<_>>(), &[&["--unordered"], flags].concat());
-    let told = run.told();
-    assert_eq!(run.output.status.code(), Some(i32::from(!told.left.is_empty())), "{}", run.said());
-    (told.corrected - 1, told.left.into_iter().map(|(_, _, reason)| reason).collect())
 }
 
 #[test]
@@ -144,11 +120,7 @@ fn a_variable_of_urscript_with_one_of_several_values_is_computed() {
 fn targets_of_other_instructions_of_rapid_are_corrected_or_named() {
     let cell = Cell::kuka(85);
     let axes = START.map(f64::to_degrees);
-    let target = |k: usize| {
-        let pose = cell.nominal.base_from_tip(&beside(k));
-        let ([x, y, z], [i, j, l, w]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
-        format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{l:.9}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
-    };
+    let target = |k: usize| robtarget(&cell.nominal.base_from_tip(&beside(k)), UNCHECKED);
     let head = format!(
         "MODULE m\nVAR robtarget found;\nPROC main()\nConfL\\Off;\nMoveAbsJ [{axes:?},[9E9,9E9,9E9,9E9,9E9,9E9]],v10,fine,tool0;\n"
     );

@@ -1,7 +1,6 @@
 //! Routines of KRL that interrupts and triggers run, and frames that these set, at a time that the text does not tell.
 
-use crate::changing::beside;
-use crate::not_told::{krl, krl_moves, krl_text, told};
+use crate::programs_support::text::{beside, krl_moves, krl_pose as krl, krl_text, told};
 use crate::programs_support::{Cell, assert_brings_to, krl_frame, numbers};
 use crate::ways;
 use robotcal::programs::LeftReason;

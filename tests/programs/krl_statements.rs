@@ -1,6 +1,6 @@
 //! Statements of KRL beside the usual ones: where the robot goes behind them, and with which frames.
 
-use crate::changing::{beside, told};
+use crate::programs_support::text::{beside, told_beside_first as told};
 use crate::programs_support::{Cell, Run, assert_brings_to, krl_frame};
 use crate::ways::krl;
 use robotcal::programs::LeftReason;

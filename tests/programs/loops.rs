@@ -1,7 +1,7 @@
 //! Loops that are left or begun again from within, and threads: what they set for the text behind them.
 
-use crate::not_told::{krl, krl_moves, krl_text, script_pose, told};
 use crate::programs_support::Cell;
+use crate::programs_support::text::{krl_moves, krl_pose as krl, krl_text, script_pose, told};
 use robotcal::geom::Pose;
 use robotcal::programs::LeftReason;
 

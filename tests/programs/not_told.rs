@@ -1,25 +1,8 @@
 //! Programs whose numbers alone do not say where the robot goes: such targets stay as they are, by name.
 
-use crate::programs_support::{Cell, status_turn};
-use robotcal::geom::{Pose, log_so3};
+use crate::programs_support::Cell;
+use crate::programs_support::text::{UNCHECKED, krl_moves, krl_pose as krl, krl_text, robtarget, script_pose, told};
 use robotcal::programs::LeftReason;
-
-/// A flange pose as KRL has it, with status and turn.
-pub(super) fn krl(cell: &Cell, q: &[f64]) -> String {
-    let pose = cell.nominal.base_from_tip(q);
-    let [c, b, a] = pose.rpy().map(f64::to_degrees);
-    let [x, y, z] = pose.xyz().map(|v| 1e3 * v);
-    let (s, t) = status_turn(q);
-    format!("{{X {x:.4},Y {y:.4},Z {z:.4},A {a:.6},B {b:.6},C {c:.6},S {s},T {t}}}")
-}
-
-/// How many targets were corrected, and the reasons of those that were left.
-pub(super) fn told(cell: &Cell, files: &[(&str, String)], flags: &[&str]) -> (usize, Vec<String>) {
-    let paths: Vec<_> = files.iter().map(|(name, text)| cell.write(name, text.as_bytes())).collect();
-    let flags = [&["--unordered"], flags].concat();
-    let told = cell.compensate(&paths.iter().collect::<Vec<_>>(), &flags).told();
-    (told.corrected, told.left.into_iter().map(|(_, _, reason)| reason).collect())
-}
 
 /// Two poses `XP1` and `XP2`, the motion data of the first in the frame `IPO`.
 fn krl_module(cell: &mut Cell, ipo: &str, moves: &str) -> Vec<(&'static str, String)> {
@@ -94,9 +77,7 @@ fn robtargets_under_a_program_displacement_are_left() {
     let mut cell = Cell::kuka(64);
     let target = |cell: &mut Cell| {
         let q: Vec<f64> = START.iter().map(|q| q.to_radians() + 0.05 * cell.readings()[0].sin()).collect();
-        let pose = cell.nominal.base_from_tip(&q);
-        let ([x, y, z], [i, j, k, w]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
-        format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{k:.9}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
+        robtarget(&cell.nominal.base_from_tip(&q), UNCHECKED)
     };
     let unknown = LeftReason::FrameUnknown.name().to_owned();
     for (body, corrected, left) in [
@@ -120,12 +101,6 @@ fn robtargets_under_a_program_displacement_are_left() {
         let start = format!("--start={}", START.map(|q| q.to_string()).join(","));
         assert_eq!(told(&cell, &[("m.mod", text)], &[&start]), (corrected, vec![unknown.clone(); left]), "{body}");
     }
-}
-
-/// A pose of the tool as URScript has it.
-pub(super) fn script_pose(flange: &Pose) -> String {
-    let (xyz, r) = (flange.xyz(), log_so3(&flange.rotation));
-    format!("p[{:.9},{:.9},{:.9},{:.9},{:.9},{:.9}]", xyz[0], xyz[1], xyz[2], r[0], r[1], r[2])
 }
 
 #[test]
@@ -168,8 +143,7 @@ fn poses_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_
         joints.join(",")
     );
     let pose = cell.nominal.base_from_tip(&q);
-    let ([x, y, z], [i, j, k, w]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
-    let target = format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{k:.9}],[0,0,0,0],[@,9E9,9E9,9E9,9E9,9E9]]");
+    let target = robtarget(&pose, UNCHECKED).replacen("9E9", "@", 1);
     let rapid = |before: &str| {
         format!("MODULE m\nPROC main()\nConfJ\\Off;\n{before}MoveJ {target},v10,fine,tool0;\nENDPROC\nENDMODULE\n")
     };
@@ -213,7 +187,6 @@ fn poses_behind_branches_that_set_tool_frame_or_displacement_differently_are_lef
         assert_eq!(told(&cell, &[in_krl(body)], &[]), (1 - left.len(), left), "{body}");
     }
     let (tip, start) = (cell.nominal.base_from_tip(&q), q.iter().map(|q| q.to_degrees().to_string()));
-    let ([x, y, z], [i, j, k, w]) = (tip.xyz().map(|v| 1e3 * v), tip.quaternion_xyzw());
     let start = format!("--start={}", start.collect::<Vec<_>>().join(","));
     let displaced = "PDispSet [[100,0,0],[1,0,0,0],[0,0,0],[0,0,0]];\n";
     for (body, left) in [
@@ -222,8 +195,7 @@ fn poses_behind_branches_that_set_tool_frame_or_displacement_differently_are_lef
         (format!("{displaced}IF a THEN\nPDispOff;\nENDIF\n"), vec![work]),
         (format!("{displaced}IF a THEN\nPDispOff;\nELSE\nPDispOff;\nENDIF\n"), vec![]),
     ] {
-        let target =
-            format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{k:.9}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+        let target = robtarget(&tip, UNCHECKED);
         let text =
             format!("MODULE m\nPROC main()\nConfJ\\Off;\n{body}MoveJ {target},v10,fine,tool0;\nENDPROC\nENDMODULE\n");
         let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
@@ -240,20 +212,6 @@ fn poses_behind_branches_that_set_tool_frame_or_displacement_differently_are_lef
         let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
         assert_eq!(told(&cell, &[("a.script", text)], &[]), (2 - left.len(), left), "{body}");
     }
-}
-
-/// A module of KRL whose tool and base are flange and foot at first; `SET` sets another tool, `MOVE` goes to a pose.
-pub(super) fn krl_text(pose: &str, body: &str) -> String {
-    let set = "$TOOL={X 0.0,Y 0.0,Z 50.0,A 0.0,B 0.0,C 0.0}";
-    let body = body.replace("SET", set).replace("MOVE", &format!("PTP {pose}"));
-    format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{body}\nEND\n")
-}
-
-/// The motions of a module as they were corrected.
-pub(super) fn krl_moves(cell: &Cell, text: &str) -> Vec<String> {
-    let file = cell.write("a.src", text.as_bytes());
-    let run = cell.compensate(&[&file], &["--unordered"]);
-    run.text("a.src").lines().filter(|line| line.starts_with("PTP")).map(str::to_owned).collect()
 }
 
 #[test]
@@ -319,10 +277,9 @@ fn routines_of_scripts_and_modules_that_set_tool_or_displacement_are_followed_to
     let mut cell = Cell::kuka(72);
     let q = cell.readings();
     let (tip, start) = (cell.nominal.base_from_tip(&q), q.iter().map(|q| q.to_degrees().to_string()));
-    let ([x, y, z], [i, j, k, w]) = (tip.xyz().map(|v| 1e3 * v), tip.quaternion_xyzw());
     let start = format!("--start={}", start.collect::<Vec<_>>().join(","));
     let displace = "PDispSet [[100,0,0],[1,0,0,0],[0,0,0],[0,0,0]];\n";
-    let target = format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{k:.9}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]");
+    let target = robtarget(&tip, UNCHECKED);
     let step = format!("MoveJ {target},v10,fine,tool0;\n");
     for (body, left) in [
         (format!("Shift;\n{step}"), vec![work]),

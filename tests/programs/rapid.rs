@@ -1,8 +1,11 @@
 //! `robotcal compensate` on ABB RAPID, written as the vendor's manuals give it.
 
-use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
+use std::f64::consts::FRAC_1_SQRT_2;
 
-use crate::programs_support::{Cell, assert_meets, numbers, shape, status_turn};
+use crate::programs_support::text::{
+    TOOL, WORK, assert_tool_meets, confdata, frames, jointtarget, lines, pose, tool_robtarget as robtarget,
+};
+use crate::programs_support::{Cell, assert_meets, numbers, shape};
 use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::geom::Pose;
@@ -35,17 +38,6 @@ fn target(text: &str, key: &str) -> Vec<f64> {
     let end = text[at..].find(']').unwrap();
     let end = at + end + text[at + end..].find("]]").unwrap();
     numbers(&text[at..end])
-}
-
-pub(super) fn pose(v: &[f64]) -> Pose {
-    Pose::from_xyz_quaternion([v[0], v[1], v[2]].map(|x| 1e-3 * x), [v[4], v[5], v[6], v[3]])
-}
-
-pub(super) fn confdata(q: &[f64]) -> String {
-    let (status, _) = status_turn(q);
-    let cfx = 4 * (status & 1) + 2 * u32::from(status & 2 == 0) + u32::from(status & 4 != 0);
-    let quarter = |v: f64| (v / FRAC_PI_2).floor() as i64;
-    format!("[{},{},{},{cfx}]", quarter(q[0]), quarter(q[3]), quarter(q[5]))
 }
 
 #[test]
@@ -120,54 +112,6 @@ fn malformed_modules_are_refused_with_their_line() {
         let run = cell.compensate(&[&file], &[]).expect(2);
         assert_says(&run.said(), code, &names);
     }
-}
-
-/// A robtarget of the tool at `q` with these configuration data.
-pub(super) fn robtarget(cell: &Cell, q: &[f64], tool: &Pose, base: &Pose, cf: &str) -> String {
-    let p = base.inverse() * cell.nominal.base_from_tip(q) * *tool;
-    let [x, y, z] = p.xyz().map(|v| 1e3 * v);
-    let [qx, qy, qz, qw] = p.quaternion_xyzw();
-    format!("[[{x:.4},{y:.4},{z:.4}],[{qw:.9},{qx:.9},{qy:.9},{qz:.9}],{cf},[9E9,9E9,9E9,9E9,9E9,9E9]]")
-}
-
-pub(super) fn jointtarget(q: &[f64]) -> String {
-    let degrees: Vec<String> = q.iter().map(|v| format!("{:.9}", v.to_degrees())).collect();
-    format!("[[{}],[9E9,9E9,9E9,9E9,9E9,9E9]]", degrees.join(","))
-}
-
-pub(super) const TOOL: &str =
-    "PERS tooldata tGun:=[TRUE,[[97.4,0,223.1],[0.924,0,0.382389,0]],[5,[23,0,75],[1,0,0,0],0,0,0]];\n";
-pub(super) const WORK: &str =
-    "PERS wobjdata wTable:=[FALSE,TRUE,\"\",[[300,-60,20.5],[0.707107,0,0,0.707107]],[[0,20.25,3],[1,0,0,0]]];\n";
-
-pub(super) fn frames() -> (Pose, Pose) {
-    let frame = |v: [f64; 7]| pose(&v);
-    let base = frame([300.0, -60.0, 20.5, FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2])
-        * frame([0.0, 20.25, 3.0, 1.0, 0.0, 0.0, 0.0]);
-    (frame([97.4, 0.0, 223.1, 0.924, 0.0, 0.382389, 0.0]), base)
-}
-
-/// Asserts that the real robot's tool is where the program meant it (m, rad), where the controller goes to `new` near `q`.
-pub(super) fn assert_tool_meets(
-    cell: &Cell,
-    tool: &Pose,
-    old: &Pose,
-    new: &Pose,
-    q: &[f64],
-    most_rad: f64,
-    what: &str,
-) {
-    let limits = inverse::reading_limits(&cell.nominal.chain);
-    let commanded = inverse::solve_from(&cell.nominal, &limits, &(*new * tool.inverse()), q).unwrap();
-    let change = commanded.iter().zip(q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    assert!(change < 0.15, "{what} left its posture: {change}");
-    let (rad, m) = (cell.real_at(&commanded, None) * *tool).distance(old);
-    assert!(m < 1e-6 && rad < most_rad, "{what}: {m:e} m, {rad:e} rad");
-}
-
-/// Numbers of the lists in the last brackets `[[..],[..],..]` of every line that contains `key`.
-pub(super) fn lines(text: &str, key: &str) -> Vec<Vec<f64>> {
-    text.lines().filter(|l| l.contains(key)).map(|l| numbers(&l[l.find("[[").unwrap()..])).collect()
 }
 
 #[test]

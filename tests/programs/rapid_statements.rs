@@ -1,7 +1,9 @@
 //! Where statements of RAPID begin, and the frames of points to which no known move goes.
 
+use crate::programs_support::text::{
+    TOOL, WORK, assert_tool_meets, confdata, frames, jointtarget, lines, pose, tool_robtarget as robtarget,
+};
 use crate::programs_support::{Cell, Run};
-use crate::rapid::{TOOL, WORK, assert_tool_meets, confdata, frames, jointtarget, lines, pose, robtarget};
 use robotcal::programs::LeftReason;
 
 /// A posture away from singular ones, rad.

@@ -1,14 +1,12 @@
 //! Positions, tools and frames that routines change which are given them by reference.
 
-use crate::not_told::{krl, told};
 use crate::programs_support::Cell;
+use crate::programs_support::text::{UNCHECKED, krl_pose as krl, robtarget, told};
 use robotcal::programs::LeftReason;
 
 /// A pose as RAPID has it, with confdata that no check heeds.
 fn rapid(cell: &Cell, q: &[f64]) -> String {
-    let pose = cell.nominal.base_from_tip(q);
-    let ([x, y, z], [i, j, l, w]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
-    format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{l:.9}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
+    robtarget(&cell.nominal.base_from_tip(q), UNCHECKED)
 }
 
 const TOOL: &str = "[TRUE,[[0,0,0],[1,0,0,0]],[1,[0,0,50],[1,0,0,0],0,0,0]]";

@@ -1,16 +1,13 @@
 //! Data of one name in several modules and routines of RAPID.
 
+use crate::programs_support::text::{NO_AXES as AXES, UNCHECKED, robtarget};
 use crate::programs_support::{Cell, numbers};
 use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::programs::LeftReason;
 
-const AXES: &str = "[9E9,9E9,9E9,9E9,9E9,9E9]";
-
 fn literal(cell: &Cell, q: &[f64]) -> String {
-    let pose = cell.nominal.base_from_tip(q);
-    let ([x, y, z], [i, j, l, w]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
-    format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{l:.9}],[0,0,0,0],{AXES}]")
+    robtarget(&cell.nominal.base_from_tip(q), UNCHECKED)
 }
 
 fn tool(z: f64) -> String {

@@ -1,8 +1,7 @@
 //! Calls of URScript that are no moves to a target in numbers: what moves on top, moves elsewhere, or is in none of the files.
 
-use crate::changing::{START, beside};
-use crate::not_told::{script_pose, told};
 use crate::programs_support::Cell;
+use crate::programs_support::text::{START, beside, script_pose, told};
 use robotcal::programs::LeftReason;
 
 /// A program; `@` stands for a new pose each time.

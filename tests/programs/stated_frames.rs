@@ -1,9 +1,9 @@
 //! Tool and work object that the user states: for what the text does not tell, and for nothing else.
 
-use crate::changing::beside;
-use crate::not_told::{krl, krl_text, script_pose, told};
 use crate::programs_support::Cell;
-use crate::rapid::{confdata, robtarget};
+use crate::programs_support::text::{
+    beside, confdata, krl_pose as krl, krl_text, script_pose, told, tool_robtarget as robtarget,
+};
 use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::geom::Pose;

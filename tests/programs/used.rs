@@ -1,7 +1,7 @@
 //! Declared positions that are no targets, or not only: frames of others, and parts of what is computed.
 
-use crate::not_told::krl;
 use crate::programs_support::Cell;
+use crate::programs_support::text::krl_pose as krl;
 use robotcal::programs::LeftReason;
 
 #[test]

@@ -1,7 +1,6 @@
 //! Targets to which several ways lead: they are corrected where all of these mean the same posture.
 
-use crate::changing::{START, beside, pose_text};
-use crate::not_told::{script_pose, told};
+use crate::programs_support::text::{START, UNCHECKED, beside, pose_text, robtarget, script_pose, told};
 use crate::programs_support::{Cell, assert_brings_to, krl_frame};
 use robotcal::programs::LeftReason;
 
@@ -115,11 +114,7 @@ fn a_target_of_a_script_is_left_where_the_ways_to_it_mean_several_postures() {
 fn a_target_of_rapid_without_confdata_is_left_where_the_ways_to_it_mean_several_postures() {
     let cell = Cell::kuka(114);
     let joints = |q: &[f64]| format!("[{:?},[9E9,9E9,9E9,9E9,9E9,9E9]]", degrees(q));
-    let pose = |q: &[f64]| {
-        let pose = cell.nominal.base_from_tip(q);
-        let ([x, y, z], [i, j, l, w]) = (pose.xyz().map(|v| 1e3 * v), pose.quaternion_xyzw());
-        format!("[[{x:.4},{y:.4},{z:.4}],[{w:.9},{i:.9},{j:.9},{l:.9}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
-    };
+    let pose = |q: &[f64]| robtarget(&cell.nominal.base_from_tip(q), UNCHECKED);
     let writer = Writer { joints: &joints, pose: &pose };
     let end = ",v10,fine,tool0;\n";
     let text = |body: &str| {
