@@ -80,14 +80,20 @@ pub(super) fn seen_lengths(series: &Series, several: bool, bodies: &[SeenBody]) 
     let is_known = |name: &String| bodies.iter().any(|b| &b.instrument == name || &b.body == name);
     let is_marker = |name: &String| name.parse::<u32>().is_ok_and(|id| series.plate.index_of(id).is_some());
     let mut lengths = Vec::new();
+    // A target that the tracker lost everywhere is known by name, and has no place.
+    let is_lost = |name: &String| series.spatial.lost.contains(name);
     for given in series.manifest.distance.iter().filter(|d| !d.between.iter().all(is_marker)) {
         let named = |name: &String| if is_known(name) { name.clone() } else { qualified.name(name) };
         let between = given.between.each_ref().map(named);
-        if let Some(unknown) = between.iter().position(|name| !is_known(name)) {
+        let unknown = |end: &usize| !is_known(&between[*end]);
+        if let Some(unknown) = (0..2).find(|end| unknown(end) && !is_lost(&given.between[*end])) {
             let what =
                 format!("[[distance]] names '{}', and nothing of this name was measured", given.between[unknown]);
             let remedy = "name two contacts of contacts.csv, two targets of points.csv or poses.csv, or two markers of the plate";
             return Err(Error::new(Code::CsvName, series.manifest_file().display(), what, remedy));
+        }
+        if (0..2).any(|end| unknown(&end)) {
+            continue;
         }
         lengths.push(SeenLength { between, distance_m: given.distance_m, sigma_m: given.sigma_m });
     }

@@ -1,6 +1,6 @@
 //! `poses.csv`: poses of a body on the tip, seen by a tracker.
 
-use super::quaternion::quaternion;
+use super::quaternion::{are_zeros, quaternion};
 use super::stop_index::{StopIndex, position, position_columns, refuse_twice, sigma, stop_column, target_name};
 use super::table::{Row, Table};
 use crate::error::Result;
@@ -23,27 +23,42 @@ pub struct PoseRow {
     pub line: u64,
 }
 
+/// A row without a measurement.
+pub(super) struct LostRow {
+    /// Name of the body.
+    pub target: String,
+    /// Line in the file.
+    pub line: u64,
+}
+
 const KNOWN: [&str; 12] =
     ["stop", "image", "target", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw", "sigma_m", "sigma_rad"];
 
-pub(super) fn rows(table: &Table, stops: &StopIndex<'_>) -> Result<Vec<PoseRow>> {
+/// The rows, and those that are all zeros, quaternion included: there the tracker had lost the target.
+pub(super) fn rows(table: &Table, stops: &StopIndex<'_>) -> Result<(Vec<PoseRow>, Vec<LostRow>)> {
     table.refuse_unknown(&KNOWN)?;
     let (stop, target, xyz) = (stop_column(table)?, table.require("target")?, position_columns(table)?);
     let [qx, qy, qz, qw] = ["qx", "qy", "qz", "qw"].map(|name| table.require(name));
     let xyzw = [qx?, qy?, qz?, qw?];
     let (sigma_m, sigma_rad) = (table.column("sigma_m"), table.column("sigma_rad"));
-    let one = |row: Row<'_>| {
+    let (mut rows, mut lost, mut named) = (Vec::new(), Vec::new(), Vec::new());
+    for row in table.rows() {
+        let (stop_index, name) = (stops.find(table, row, stop)?, target_name(table, row, target)?);
+        named.push((stop_index, name.clone(), row.line));
+        if are_zeros(table, row, &xyz) && are_zeros(table, row, &xyzw) {
+            lost.push(LostRow { target: name, line: row.line });
+            continue;
+        }
         let place = position(table, row, xyz)?;
-        Ok(PoseRow {
-            stop: stops.find(table, row, stop)?,
-            target: target_name(table, row, target)?,
+        rows.push(PoseRow {
+            stop: stop_index,
+            target: name,
             tracker_from_target: Pose::new(quaternion(table, row, xyzw, row.cell(stop))?, place),
             sigma_m: sigma(table, row, sigma_m)?,
             sigma_rad: sigma(table, row, sigma_rad)?,
             line: row.line,
-        })
-    };
-    let rows: Vec<PoseRow> = table.rows().map(one).collect::<Result<_>>()?;
-    refuse_twice(table, target, rows.iter().map(|r| (r.stop, r.target.as_str(), r.line)))?;
-    Ok(rows)
+        });
+    }
+    refuse_twice(table, target, named.iter().map(|(stop, name, line)| (*stop, name.as_str(), *line)))?;
+    Ok((rows, lost))
 }

@@ -9,6 +9,11 @@ use crate::geom::Pose;
 /// A quaternion whose length differs from 1 by more is none: rounded ones differ by less.
 const MOST_OFF_UNIT: f64 = 1e-3;
 
+/// True where nothing stands in these columns but zeros: what is no rotation, and no slip of digits.
+pub(super) fn are_zeros(table: &Table, row: Row<'_>, columns: &[usize]) -> bool {
+    columns.iter().all(|&c| table.number(row, c).is_ok_and(|value| value == 0.0))
+}
+
 /// The rotation of the quaternion in these columns; `stop` is for the message.
 pub(super) fn quaternion(table: &Table, row: Row<'_>, columns: [usize; 4], stop: &str) -> Result<Matrix3<f64>> {
     let [x, y, z, w] = columns.map(|c| table.number(row, c));

@@ -172,3 +172,22 @@ fn rows_of_a_lost_target_are_left_out_with_their_lines() {
     let once = series(&[("points.csv", &format!("{head}left/0,ball,0,0,0\nleft/1,ball,1,2,4\n"))]);
     assert_eq!((once.spatial.points.len(), once.notices.len()), (2, 0));
 }
+
+/// All zeros are no pose, not even one: a quaternion of length 0 beside a place is a mistake.
+#[test]
+fn zeros_with_their_quaternion_are_a_lost_target() {
+    let head = "stop,target,x_m,y_m,z_m,qx,qy,qz,qw\n";
+    let good = "left/1,body,1,2,3,0,0,0.7071068,0.7071068\n";
+    let read = series(&[("poses.csv", &format!("{head}left/0,body,0,0.0,0,0,0,0,-0\n{good}"))]);
+    assert_eq!(read.spatial.poses.iter().map(|p| p.line).collect::<Vec<_>>(), [3]);
+    assert_eq!(read.notices.iter().map(|n| n.code).collect::<Vec<_>>(), [Code::TargetLost]);
+    assert!(read.spatial.lost.is_empty(), "{:?}", read.spatial.lost);
+    let of_other = series(&[("poses.csv", &format!("{head}left/0,other,0,0,0,0,0,0,0\n{good}"))]);
+    assert_eq!(of_other.spatial.lost, ["other"]);
+    let elsewhere = refusal("poses.csv", &format!("{head}left/0,body,1,0,0,0,0,0,0\n{good}"));
+    assert_eq!(elsewhere.code, Code::CsvRange);
+    let unknown = refusal("poses.csv", &format!("{head}left/7,body,0,0,0,0,0,0,0\n{good}"));
+    assert_eq!(unknown.code, Code::StopUnknown);
+    let all = refusal("poses.csv", &format!("{head}left/0,body,0,0,0,0,0,0,0\nleft/1,body,0,0,0,0,0,0,0\n"));
+    assert_eq!(all.code, Code::TargetLost);
+}
