@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
-use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries, intern};
+use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries, intern, stop_name};
 
 /// Where a touch says that the body was.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,7 +57,7 @@ impl Touches {
     /// Places in more than one frame; measurements at stops without readings; no measurements at all.
     pub fn of(series: &[MeasuredSeries]) -> Result<Self> {
         let mut touches = Self::default();
-        for s in series {
+        for (index, s) in series.iter().enumerate() {
             let mut postures = vec![None; s.stops.len()];
             for b in &s.bodies {
                 let stop = &s.stops[b.stop];
@@ -95,7 +95,8 @@ impl Touches {
                 });
                 let body = intern(&mut touches.bodies, &b.body);
                 let (sigma_m, sigma_rad) = (b.sigma_m, b.sigma_rad);
-                touches.all.push(Touch { stop: stop.image.clone(), posture, body, seen, sigma_m, sigma_rad });
+                let stop = stop_name(series, (index, b.stop));
+                touches.all.push(Touch { stop, posture, body, seen, sigma_m, sigma_rad });
             }
         }
         if touches.all.is_empty() {

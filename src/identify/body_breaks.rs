@@ -10,7 +10,7 @@ use super::points_start::{FEWEST_POINTS, Placed, PointAt, distances, each_place,
 use crate::assess::Limits;
 use crate::error::{Code, Error, Quantity, Result};
 use crate::geom::{Pose, rigid_fit};
-use crate::problem::{Adjustment, BodySeen, InstrumentKind, MeasuredSeries};
+use crate::problem::{Adjustment, BodySeen, InstrumentKind, MeasuredSeries, stop_name};
 
 /// Of the rows that others do not fit, one in so many may.
 const MOST_MISSED: usize = 4;
@@ -92,7 +92,7 @@ impl Moved {
             InstrumentKind::Socket | InstrumentKind::Places => "contact",
         };
         let own = &series[first.read.0];
-        let stop = own.stops.get(first.read.1).map_or("", |stop| stop.image.as_str());
+        let stop = stop_name(series, first.read);
         let (from, rows) = match first.read.0 == last.read.0 {
             true => {
                 (format!("from {stop} on"), format!("put the stops from {stop} on into a series of their own with"))

@@ -122,6 +122,18 @@ impl MeasuredSeries {
     }
 }
 
+/// Name of a stop, by the index of its series and its own; with its series where another series has one of this name, too.
+pub fn stop_name(all: &[MeasuredSeries], (series, stop): (usize, usize)) -> String {
+    let Some(name) = all.get(series).and_then(|s| s.stops.get(stop)).map(|stop| &stop.image) else {
+        return String::new();
+    };
+    let has_it = |other: &MeasuredSeries| other.stops.iter().any(|stop| &stop.image == name);
+    match all.iter().enumerate().any(|(k, other)| k != series && has_it(other)) {
+        true => format!("{} {name}", all[series].name),
+        false => name.clone(),
+    }
+}
+
 /// What an instrument measured of a body at a stop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenBody {

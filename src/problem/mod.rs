@@ -45,7 +45,9 @@ pub use linearise::{
     Chained, ImageTerms, Residual, Weighting, equations, linearise, linearise_with_equations, predict,
 };
 pub use measured::{Mark, MarkerObservation};
-pub use measured_series::{KnownCamera, LensChoice, MeasuredSeries, MeasuredStop, SeenBody, SeenLength, intern};
+pub use measured_series::{
+    KnownCamera, LensChoice, MeasuredSeries, MeasuredStop, SeenBody, SeenLength, intern, stop_name,
+};
 pub use noise::Noise;
 pub use plate_distance::{PlateDistance, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance};
 pub use plate_shape::PlateShape;
