@@ -51,6 +51,23 @@ enum What {
         from: usize,
         moved: Pose,
     },
+    /// The place of the touches at these stops, or of those at others: any of them explains as much.
+    OneOf(Vec<String>),
+}
+
+impl What {
+    /// Stops of which a place counts as unknown.
+    fn stops(&self, touches: &Touches) -> Option<Vec<String>> {
+        let at = |is: &dyn Fn(usize, &Touch) -> bool| {
+            let all = touches.all.iter().enumerate();
+            Some(all.filter(|(k, touch)| is(*k, touch)).map(|(_, touch)| touch.stop.clone()).collect())
+        };
+        match self {
+            Self::Place(place) => at(&|_, touch| touch.seen == Seen::Point(*place)),
+            Self::Touch(one, _) => at(&|k, _| k == *one),
+            _ => None,
+        }
+    }
 }
 
 /// The mistake that explains why touches scatter; `None` where they do not, or none of them does. Where none does alone, it is looked for beside
@@ -142,11 +159,7 @@ fn explained(
     let fewest = limits.fewest_touches;
     let from = fewest..(touches.postures.len() + 1).saturating_sub(fewest);
     let with_given = |(touches, what): (Touches, What)| Undone { touches, given: *given, what };
-    let places = known_places(touches.all.iter()).into_iter().map(|place| {
-        let (other, _) = with_unknown_places(touches, |touch| touch.seen == Seen::Point(place));
-        (other, What::Place(place))
-    });
-    let single = (0..touches.all.len()).filter_map(|k| of_another_place(touches, k));
+    let [places, single] = other_places(touches);
     let tools = from.clone().filter(|_| given.tool.is_none()).map(|from| other_tool(touches, from));
     let works = from.filter_map(|from| {
         let (apart, known) = with_unknown_places(touches, |touch| touch.posture >= from);
@@ -154,20 +167,56 @@ fn explained(
     });
     let kinds = [
         read_otherwise(robot, touches).map(with_given).collect(),
-        places.map(with_given).collect(),
-        single.map(with_given).collect(),
+        places.into_iter().map(with_given).collect(),
+        single.into_iter().map(with_given).collect(),
         tools.map(with_given).collect(),
         works.map(with_given).collect(),
         given.tool.map(|tool| without_tool(touches, given, tool)).into_iter().collect::<Vec<Undone>>(),
     ];
     let all: Vec<Undone> = kinds.into_iter().flat_map(|undone| nearest(robot, undone)).collect();
-    let fitted = |undone: &Undone| fit(robot, &undone.touches, &undone.given, limits).ok();
-    let explains = |fit: &FrameFit| {
-        fit.contradiction(limits) < limits.mistake_explains * found.contradiction(limits)
-            && fit.rms_m < limits.touch_sigma_m
+    let explains = |fit: &FrameFit| explains(fit, found, limits);
+    let tried = |undone: Undone| {
+        fit(robot, &undone.touches, &undone.given, limits).ok().filter(explains).map(|fit| (fit, undone))
     };
-    let tried = |undone: Undone| fitted(&undone).filter(explains).map(|fit| (fit, undone));
-    all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a, limits), rank(b, limits)))
+    let (best, undone) =
+        all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a, limits), rank(b, limits)))?;
+    let one_of = one_of(robot, touches, given, (&best, &undone.what, found, limits));
+    Some((best, Undone { what: one_of.map_or(undone.what, What::OneOf), ..undone }))
+}
+
+/// True where a fit leaves little of what contradicts another.
+fn explains(fit: &FrameFit, found: &FrameFit, limits: &Limits) -> bool {
+    fit.contradiction(limits) < limits.mistake_explains * found.contradiction(limits)
+        && fit.rms_m < limits.touch_sigma_m
+}
+
+/// Every known place as unknown, and that of every touch alone.
+fn other_places(touches: &Touches) -> [Vec<(Touches, What)>; 2] {
+    let places = known_places(touches.all.iter()).into_iter().map(|place| {
+        let (other, _) = with_unknown_places(touches, |touch| touch.seen == Seen::Point(place));
+        (other, What::Place(place))
+    });
+    let single = (0..touches.all.len()).filter_map(|k| of_another_place(touches, k));
+    [places.collect(), single.collect()]
+}
+
+/// The stops of one of which the place is wrong, where another place, or touch, explains nearly as much as the best: it must leave so much more that
+/// the best explains it away. `None` where the best alone does.
+fn one_of(
+    robot: &KnownRobot,
+    touches: &Touches,
+    given: &Given,
+    (best, what, found, limits): (&FrameFit, &What, &FrameFit, &Limits),
+) -> Option<Vec<String>> {
+    let own = what.stops(touches)?;
+    let is_rival = |(touches, _): &(Touches, What)| {
+        let left = fit(robot, touches, given, limits).ok().filter(|fit| explains(fit, found, limits));
+        left.is_some_and(|left| best.contradiction(limits) > limits.mistake_explains * left.contradiction(limits))
+    };
+    let others: Vec<(Touches, What)> = other_places(touches).into_iter().flatten().collect();
+    let rivals = others.into_par_iter().filter(is_rival).filter_map(|(_, what)| what.stops(touches));
+    let stops: BTreeSet<String> = rivals.flatten().chain(own.clone()).collect();
+    (stops.len() > own.len()).then(|| stops.into_iter().collect())
 }
 
 /// Those that the closed form fits best.
@@ -310,6 +359,14 @@ fn named(undone: &Undone, left: &FrameFit, touches: &Touches) -> MistakeKind {
                 1e3 * (found - place).norm()
             );
             (Code::PlaceContradicted, what, "correct its row in contacts.csv, or leave it out".to_owned())
+        }
+        What::OneOf(stops) => {
+            let what = format!(
+                "one of the touches at {} was not of the place that is said: whichever is taken as wrong, the others fit, and they do not tell which",
+                stops.join(", ")
+            );
+            let remedy = "touch these points again, and some more with the tip turned another way";
+            (Code::PlaceContradicted, what, remedy.to_owned())
         }
         What::GivenTool(tool) => {
             let found = &left.tools[0];

@@ -662,6 +662,32 @@ fn usual_mistakes_in_touches_are_named() {
     assert!(fit(&robot, &good, &Given { tool: None, plate: None }, &limits).unwrap().robot_sigmas < 4.0);
 }
 
+/// Four places and six unknowns: a place that is wrong can be another one as well.
+#[test]
+fn of_few_touches_the_wrong_one_is_among_those_that_are_named() {
+    let World { robot, truth } = world();
+    let toucher = Toucher { truth: &truth, work: work(), tool: TOOL.into(), sigma_m: 5e-5, joint_sigma: 2e-5 };
+    let given = Given { tool: Some(Pose::new(Matrix3::identity(), TOOL.into())), plate: None };
+    let limits = Limits::default();
+    let mut named = 0;
+    for seed in 41..53 {
+        let mut rng = rng(seed);
+        let q = spread(&ranges(&robot.stops), 4, &mut rng);
+        let mut touches = toucher.places(&q, "fixture", &mut rng);
+        if let Seen::Point(place) = &mut touches.all[1].seen {
+            place.z += 2e-3;
+        }
+        let found = fit(&robot, &touches, &given, &limits).unwrap();
+        let mistake = touch_mistake(&robot, &touches, &given, (&found, &limits)).map(Finding::from);
+        if let Some(finding) = mistake.filter(|f| f.code() == Code::PlaceContradicted) {
+            // words: the stops that are named.
+            assert!(finding.seen().contains("t01"), "seed {seed}: {}", finding.seen());
+            named += 1;
+        }
+    }
+    assert!(named > 0);
+}
+
 /// The plate of a solution stands in the base as uncertainly as the base itself, and that is no error of the tool on the plate.
 #[test]
 fn touches_of_the_plate_are_judged_by_where_the_tool_is_on_it() {
