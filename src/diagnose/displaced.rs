@@ -23,6 +23,8 @@ pub enum Carried {
     Target,
     /// What holds all targets on the tip.
     Bracket,
+    /// What all sockets are fixed to.
+    Fixture,
 }
 
 /// In which images it stands elsewhere.
@@ -45,6 +47,8 @@ pub struct Displaced {
     pub series: String,
     /// What.
     pub body: Carried,
+    /// Names of the places that moved together; none where it is one body.
+    pub places: Vec<String>,
     /// Name of the mounting of its images, or of what measures it.
     pub mounting: String,
     /// How the images are divided.
@@ -74,13 +78,9 @@ impl Displaced {
         self.explains_most && self.is_measured() && self.mounting == instrument
     }
 
-    fn is_camera(&self) -> bool {
-        matches!(self.body, Carried::CameraInHand | Carried::Camera)
-    }
-
     /// True where a tracker or contacts show it, not images.
     pub(super) fn is_measured(&self) -> bool {
-        matches!(self.body, Carried::Instrument | Carried::Target | Carried::Bracket)
+        matches!(self.body, Carried::Instrument | Carried::Target | Carried::Bracket | Carried::Fixture)
     }
 
     /// The first image in which it stands elsewhere.
@@ -97,6 +97,7 @@ impl Displaced {
             Carried::Instrument => "tracker",
             Carried::Target => "target on the tip",
             Carried::Bracket => "bracket of all targets on the tip",
+            Carried::Fixture => "fixture of all sockets",
         }
     }
 }
@@ -113,6 +114,7 @@ impl Kind for Displaced {
             Carried::Camera | Carried::CameraInHand => of(Code::CameraDisplaced, Code::CameraDrifts, Code::CameraLoose),
             Carried::Instrument => of(Code::TrackerDisplaced, Code::TrackerDrifts, Code::TrackerDisplaced),
             Carried::Target | Carried::Bracket => of(Code::TargetDisplaced, Code::TargetDrifts, Code::TargetDisplaced),
+            Carried::Fixture => Code::WorkDisplaced,
         }
     }
 
@@ -122,6 +124,7 @@ impl Kind for Displaced {
 
     fn subjects(&self) -> Vec<Subject> {
         let mut all = vec![Subject::Series(self.series.clone()), Subject::Body(self.body().to_owned())];
+        all.extend(self.places.iter().cloned().map(Subject::Body));
         if !matches!(self.displacement, Displacement::AllThrough | Displacement::InAll) {
             let subject = if self.is_measured() { Subject::Stop } else { Subject::Image };
             all.extend(self.images.iter().cloned().map(subject));
@@ -154,10 +157,14 @@ impl Kind for Displaced {
         let what = match self.displacement {
             Displacement::FromThenOn => {
                 let stands = match self.body {
-                    Carried::Plate | Carried::Camera | Carried::Instrument => "stands",
+                    Carried::Plate | Carried::Camera | Carried::Instrument | Carried::Fixture => "stands",
                     Carried::PlateInHand | Carried::CameraInHand | Carried::Target | Carried::Bracket => "sits",
                 };
-                let touched = if self.is_camera() { ", creeps, or its lens was touched" } else { ", or creeps" };
+                let touched = match self.body {
+                    Carried::Camera | Carried::CameraInHand => ", creeps, or its lens was touched".to_owned(),
+                    Carried::Fixture => format!(" with {}, or the base of the robot", self.places.join(", ")),
+                    _ => ", or creeps".to_owned(),
+                };
                 format!(
                     "from {} on the {body} {stands} {size} elsewhere than before: it was moved{touched}",
                     self.first()
@@ -205,6 +212,12 @@ impl Kind for Displaced {
                     "give all targets other names from {} on, or fasten their bracket and measure again",
                     self.first()
                 ),
+                Carried::Fixture => {
+                    format!(
+                        "give all contacts other names from {} on, or fasten the fixture and measure again",
+                        self.first()
+                    )
+                }
             },
             Displacement::InAll => match self.body {
                 Carried::Camera | Carried::CameraInHand => {
@@ -218,6 +231,7 @@ impl Kind for Displaced {
                 }
                 Carried::Target => format!("give the target another name in {}", self.series),
                 Carried::Bracket => format!("give all targets other names in {}", self.series),
+                Carried::Fixture => format!("give all contacts other names in {}", self.series),
             },
             Displacement::AxisUp(_) => "fasten it, and take the series again".into(),
             Displacement::AllThrough => {

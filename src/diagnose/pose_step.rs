@@ -16,8 +16,12 @@
 //! Several targets on the tip may be held by one bracket: its twist `x` about their middle moves each of them, `A = sum_k T_k B_k`, with the columns
 //! `T_k` of a target and `B_k = [R' , -R' [d]; 0, R']` of its rotation `R` in the tip and its place `d` from the middle.
 //!
+//! Several sockets may be on one fixture: likewise, about their middle along the axes of the base, where two of them at least hold the body on either side.
+//!
 //! Another focal length looks like a camera that moved along its axis, as far as all images are taken from one distance: where a step of it falls by
 //! more than that of plate or camera, it is named instead.
+
+use std::collections::BTreeSet;
 
 use super::displaced::{Carried, Displaced, Displacement};
 use super::finding::Finding;
@@ -28,7 +32,7 @@ use super::step_rows::{Linear, Part, Step};
 use super::zero_moved::ZeroMoved;
 use crate::assess::{Accuracy, Limits};
 use crate::fit::Fit;
-use crate::problem::{Adjustment, Problem};
+use crate::problem::{Adjustment, Problem, stop_name};
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
@@ -115,7 +119,7 @@ impl Squares {
         let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
         let of_poses = share(self.poses[group], after.poses[group]);
         let of_part = match step.changed {
-            Changed::Instrument(_) | Changed::Target(_) | Changed::Bracket => {
+            Changed::Instrument(_) | Changed::Target(_) | Changed::Bracket | Changed::Fixture => {
                 let parts = self.bodies.iter().zip(&after.bodies);
                 parts.map(|(before, after)| share(before[group], after[group])).fold(0.0, f64::max)
             }
@@ -137,10 +141,7 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     let (problem, first) = (&fit.problem, *step.shown.first()?);
     let name = |shown: &Shown| match *shown {
         Shown::Image { index, .. } => problem.images[index].name.clone(),
-        Shown::Measurement(k) => {
-            let (series, stop) = problem.body_measurements[k].read;
-            setting.series[series].stops[stop].image.clone()
-        }
+        Shown::Measurement(k) => stop_name(setting.series, problem.body_measurements[k].read),
     };
     let series = setting.series[first.series(problem)].name.clone();
     let displacement = match step.order {
@@ -175,10 +176,14 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     let matters = distance_m.0 > limits.displaced_m || angle_rad.is_some_and(|angle| angle.0 > limits.displaced_rad);
     let weight = weight(matters);
     let (body, mounting) = carried(step.changed, first, problem)?;
+    let sockets: BTreeSet<usize> = step.shown.iter().filter_map(|shown| shown.socket(problem)).collect();
+    let named = |socket: usize| problem.instruments[socket].name.clone();
+    let places = sockets.into_iter().filter(|_| body == Carried::Fixture).map(named).collect();
     Some(
         Displaced {
             series,
             body,
+            places,
             mounting,
             displacement,
             images,
@@ -221,6 +226,11 @@ fn carried(changed: Changed, first: Shown, problem: &Problem) -> Option<(Carried
             let measured = &problem.body_measurements[k];
             let body = if changed == Changed::Bracket { Carried::Bracket } else { Carried::Target };
             (body, problem.instruments[measured.instrument].name.clone())
+        }
+        (Changed::Fixture, Shown::Measurement(k)) => {
+            let component = problem.instruments[problem.body_measurements[k].instrument].component;
+            let first = problem.instruments.iter().find(|i| i.component == component)?;
+            (Carried::Fixture, first.name.clone())
         }
         (Changed::Placement(_) | Changed::Mounting(_), Shown::Image { index, .. }) => {
             let image = &problem.images[index];

@@ -1,5 +1,6 @@
 //! What may differ between stops of the same robot, and a way to divide stops by it; for [`super::pose_step`].
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -20,6 +21,8 @@ pub(super) enum Changed {
     Target(usize),
     /// All targets on the tip together: what holds them.
     Bracket,
+    /// All sockets together: what they are fixed to.
+    Fixture,
     /// The zero of a reading.
     Zero(usize),
     /// The focal lengths of a camera.
@@ -37,8 +40,8 @@ impl Changed {
             Self::Mounting(m) => layout.mountings[m].clone(),
             Self::Instrument(i) => told(&layout.instruments[i]),
             Self::Target(b) => told(&layout.bodies[b]),
-            // No columns of its own: it moves those of all targets.
-            Self::Bracket => 0..0,
+            // No columns of their own: they move those of all targets, or sockets.
+            Self::Bracket | Self::Fixture => 0..0,
             Self::Zero(reading) => zeros[reading].map_or(0..0, |c| c..c + 1),
             Self::Focal(c) => layout.cameras[c].start..layout.cameras[c].start + 2,
         }
@@ -73,6 +76,31 @@ pub(super) fn bracket(Adjustment { problem, state }: &Adjustment) -> DMatrix<f64
         }
     }
     all
+}
+
+/// By how much a twist of all sockets together moves the columns of each: about their middle, along the axes of the base. None of a single one.
+pub(super) fn fixture(Adjustment { problem, state }: &Adjustment) -> DMatrix<f64> {
+    let used: BTreeSet<usize> = problem.used_bodies().map(|(_, m)| m.instrument).collect();
+    let sockets: Vec<usize> = used.into_iter().filter(|i| is_socket(problem, *i)).collect();
+    let columns = problem.layout.len();
+    if sockets.len() < 2 {
+        return DMatrix::zeros(columns, 0);
+    }
+    let place = |socket: &usize| state.instruments[*socket].translation;
+    let middle = sockets.iter().map(place).sum::<Vector3<f64>>() / sockets.len() as f64;
+    let mut all = DMatrix::zeros(columns, 6);
+    for socket in sockets {
+        let by_turn = -(place(&socket) - middle).cross_matrix();
+        for (k, column) in Changed::Instrument(socket).columns(&problem.layout, &[]).enumerate().take(3) {
+            all[(column, k)] = 1.0;
+            (0..3).for_each(|axis| all[(column, 3 + axis)] = by_turn[(k, axis)]);
+        }
+    }
+    all
+}
+
+fn is_socket(problem: &Problem, instrument: usize) -> bool {
+    problem.instruments[instrument].kind == InstrumentKind::Socket
 }
 
 /// How the stops are divided.
@@ -110,6 +138,12 @@ impl Shown {
         self.place(problem).0
     }
 
+    /// The socket that it was measured in.
+    pub(super) fn socket(self, problem: &Problem) -> Option<usize> {
+        let Self::Measurement(k) = self else { return None };
+        Some(problem.body_measurements[k].instrument).filter(|i| is_socket(problem, *i))
+    }
+
     pub(super) fn tells_of(self, problem: &Problem, changed: Changed) -> bool {
         match (self, changed) {
             (_, Changed::Zero(_)) => true,
@@ -119,6 +153,7 @@ impl Shown {
             (Self::Measurement(k), Changed::Instrument(i)) => problem.body_measurements[k].instrument == i,
             (Self::Measurement(k), Changed::Target(b)) => problem.body_measurements[k].body == b,
             (Self::Measurement(k), Changed::Bracket) => is_by_tracker(problem, &problem.body_measurements[k]),
+            (Self::Measurement(k), Changed::Fixture) => is_socket(problem, problem.body_measurements[k].instrument),
             _ => false,
         }
     }

@@ -1,5 +1,6 @@
 //! Which changes are tried, and at which stops; for [`super::pose_step`].
 
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use super::step_candidates::{Candidate, Changed, Order, Shown, stride};
@@ -30,7 +31,9 @@ impl Linear {
                     Order::Whole | Order::Drift => (0..1, 0),
                     Order::Time | Order::Up(_) => (fewest..(rows.len() + 1).saturating_sub(fewest), fewest),
                 };
-                let from = from.rev().step_by(stride(rows.len()));
+                let is_tried =
+                    |from: &usize| changed != Changed::Fixture || self.are_divided(problem, &rows, *from, fewest);
+                let from = from.rev().step_by(stride(rows.len())).filter(is_tried);
                 all.extend(from.map(|from| Candidate { changed, order, group, rows: rows.clone(), from, fewest }));
             };
             let by_weight = (0..3).filter(|_| self.is_carried(problem, changed, &rows));
@@ -50,6 +53,21 @@ impl Linear {
             divide(Order::Time, rows);
         }
         all
+    }
+
+    /// True where at least two sockets hold the body so often on either side: one alone does not tell that others moved with it.
+    fn are_divided(&self, problem: &Problem, rows: &[usize], from: usize, fewest: usize) -> bool {
+        let held = |rows: &[usize]| {
+            let mut held: BTreeMap<usize, usize> = BTreeMap::new();
+            let shown = rows.iter().flat_map(|r| self.rows[*r].shown.iter());
+            shown.filter_map(|shown| shown.socket(problem)).for_each(|socket| *held.entry(socket).or_default() += 1);
+            held
+        };
+        let [before, behind] = [&rows[..from], &rows[from..]].map(held);
+        let is_on_both = |(socket, count): &(&usize, &usize)| {
+            **count >= fewest && behind.get(*socket).is_some_and(|count| *count >= fewest)
+        };
+        fewest > 0 && before.iter().filter(is_on_both).count() > 1
     }
 
     /// The change of focus that explains more than a plate or a camera that moved once, if there is one: beyond what noise lets it, as it is
@@ -77,7 +95,7 @@ impl Linear {
         let framed = (0..problem.instruments.len()).filter(|i| problem.instruments[*i].kind != InstrumentKind::Socket);
         let targets = (0..problem.layout.bodies.len()).map(Changed::Target);
         let zeros = (0..self.zeros.len()).map(Changed::Zero);
-        let carried = targets.chain([Changed::Bracket]);
+        let carried = targets.chain([Changed::Bracket, Changed::Fixture]);
         placements.chain(mountings).chain(framed.map(Changed::Instrument)).chain(carried).chain(zeros).collect()
     }
 

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::step_candidates::{Candidate, Changed, Order, Shown, bracket};
+use super::step_candidates::{Candidate, Changed, Order, Shown, bracket, fixture};
 use crate::assess::{RootInformation, StopInformation, log_chance};
 use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
 use crate::model::joint_terms::Term;
@@ -112,8 +112,8 @@ pub(super) struct Linear {
     information: DMatrix<f64>,
     /// Columns of the zeros of readings.
     pub(super) zeros: Vec<Option<usize>>,
-    /// The columns that all targets together move, and by how much.
-    bracket: Rc<DMatrix<f64>>,
+    /// The columns that all targets together move, and all sockets, and by how much.
+    together: Rc<[DMatrix<f64>; 2]>,
 }
 
 impl Linear {
@@ -147,25 +147,31 @@ impl Linear {
             Some(problem.layout.terms.start + term)
         };
         let zeros = (0..robot.chain.readings.len()).map(zero).collect();
-        let bracket = Rc::new(bracket(linear.adjustment));
-        Self { rows: all.into_iter().filter_map(row).collect(), information, zeros, bracket }
+        let together = Rc::new([bracket(linear.adjustment), fixture(linear.adjustment)]);
+        Self { rows: all.into_iter().filter_map(row).collect(), information, zeros, together }
+    }
+
+    /// The columns that a change of several bodies together moves; none of a single one.
+    fn together(&self, changed: Changed) -> Option<&DMatrix<f64>> {
+        let [bracket, fixture] = self.together.as_ref();
+        match changed {
+            Changed::Bracket => Some(bracket),
+            Changed::Fixture => Some(fixture),
+            _ => None,
+        }
     }
 
     /// How many parameters a change has.
     pub(super) fn parameters(&self, problem: &Problem, changed: Changed) -> usize {
-        match changed {
-            Changed::Bracket => self.bracket.ncols(),
-            _ => changed.columns(&problem.layout, &self.zeros).len(),
-        }
+        let own = || changed.columns(&problem.layout, &self.zeros).len();
+        self.together(changed).map_or_else(own, DMatrix::ncols)
     }
 
     /// Derivatives of a row by a change.
     fn by(&self, row: usize, problem: &Problem, changed: Changed) -> DMatrix<f64> {
         let row = &self.rows[row];
-        match changed {
-            Changed::Bracket => product(&row.by_columns, &self.bracket),
-            _ => row.by(&changed.columns(&problem.layout, &self.zeros)),
-        }
+        let own = || row.by(&changed.columns(&problem.layout, &self.zeros));
+        self.together(changed).map_or_else(own, |moved| product(&row.by_columns, moved))
     }
 
     /// Squares `R` of what the poses that were seen miss of the readings, by the index of the noise.
@@ -327,7 +333,7 @@ impl Linear {
                 by_columns: row.by_columns.clone(),
             })
             .collect();
-        Some((Self { rows, information, zeros: self.zeros.clone(), bracket: self.bracket.clone() }, step))
+        Some((Self { rows, information, zeros: self.zeros.clone(), together: self.together.clone() }, step))
     }
 }
 
