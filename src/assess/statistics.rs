@@ -1,6 +1,7 @@
 //! Small statistics of comparisons.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -93,9 +94,32 @@ pub fn log_chance(share: f64, squares: f64, parameters: usize) -> f64 {
     b * (-x).ln_1p() + f64::ln(sum)
 }
 
+/// The run with the largest sum; of several the first, without what adds nothing at its ends. Empty where nothing is above zero.
+pub fn best_run(gains: &[f64]) -> Range<usize> {
+    let (mut best, mut most) = (0..0, 0.0);
+    let (mut first, mut sum) = (0, 0.0);
+    for (k, gain) in gains.iter().enumerate() {
+        if sum <= 0.0 {
+            (first, sum) = (k, 0.0);
+        }
+        sum += gain;
+        if sum > most {
+            (best, most) = (first..k + 1, sum);
+        }
+    }
+    best
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_run_begins_and_ends_with_rows_that_gain() {
+        assert_eq!(best_run(&[-1.0, 0.0, 2.0, -0.5, 1.0, 0.0, -1.0]), 2..5);
+        assert_eq!(best_run(&[1.0, -3.0, 1.0, 1.0]), 2..4);
+        assert_eq!(best_run(&[-1.0, 0.0]), 0..0);
+    }
 
     #[test]
     fn the_interval_holds_the_ratio_and_narrows_with_more_units() {

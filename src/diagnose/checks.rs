@@ -5,8 +5,8 @@ use super::kind::{CheckContext, Weight};
 use super::{
     camera_model, camera_pattern, contradicted_distances, exchanged_readings, extrapolates, few_images, focus,
     held_near_nominal, joint_noise, left_out_bodies, left_out_images, left_out_observations, length_standard, loose,
-    marker_off, measurement_scatter, moved, no_gain, parameter_off, plate_size, pose_step, scatter, stated_noise,
-    tag_size, undetermined, zeros_off,
+    marker_off, measurement_scatter, moved, no_gain, parameter_off, plate_size, pose_step, repeated_measurements,
+    scatter, shifted_measurements, stated_noise, tag_size, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -83,6 +83,8 @@ pub const CHECKS: &[Check] = &[
     check("moved", Stage::LeftOut(|a, s| found(moved::check(a, s)))),
     check("exchanged_readings", Stage::LeftOut(|a, _| found(exchanged_readings::check(a)))),
     check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s)))),
+    check("shifted_measurements", Stage::LeftOut(|a, s| found(shifted_measurements::check(a, s)))),
+    check("repeated_measurements", Stage::LeftOut(|a, s| found(repeated_measurements::check(a, s)))),
     check("left_out_bodies", Stage::LeftOut(|a, s| found(left_out_bodies::check(a, s)))),
     check("measurement_scatter", Stage::Fit(|a, b, s| found(measurement_scatter::check(a, b, s)))),
     check("left_out_observations", Stage::LeftOut(|a, s| found(left_out_observations::check(a, s)))),

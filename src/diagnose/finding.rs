@@ -28,7 +28,9 @@ use super::no_gain::NoGain;
 use super::noticed::Noticed;
 use super::parameter_off::ParameterOff;
 use super::plate_size::DoubtedSize;
+use super::repeated_measurements::RepeatedMeasurements;
 use super::scatter::LargeScatter;
+use super::shifted_measurements::ShiftedMeasurements;
 use super::stated_noise::NoiseContradicted;
 use super::tag_size::TagsOff;
 use super::tool_in_poses::ToolInPoses;
@@ -91,7 +93,9 @@ findings! {
     Noticed,
     ObservationsLeftOut,
     ParameterOff,
+    RepeatedMeasurements,
     ResidualPattern,
+    ShiftedMeasurements,
     TagsOff,
     ToolInPoses,
     ZeroMoved,

@@ -2,7 +2,7 @@
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
-use crate::problem::Adjustment;
+use crate::problem::{Adjustment, BodyRejection, stop_name};
 
 /// Most that are named.
 const MOST_NAMED: usize = 5;
@@ -22,9 +22,9 @@ pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<M
     let problem = &adjustment.problem;
     let mut named = Vec::new();
     for measured in &problem.body_measurements {
-        let Some(why) = &measured.rejected else { continue };
-        let (series, stop) = measured.read;
-        let name = setting.series[series].stops[stop].image.clone();
+        // What was written again and again has a finding of its own.
+        let Some(why) = measured.rejected.filter(|why| *why != BodyRejection::Repeated) else { continue };
+        let name = stop_name(setting.series, measured.read);
         named.push([name, problem.instruments[measured.instrument].name.clone(), why.to_string()]);
     }
     let (out, all) = (named.len(), problem.body_measurements.len());

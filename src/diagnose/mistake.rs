@@ -201,7 +201,8 @@ impl Kind for Mistake {
 
     fn subjects(&self) -> Vec<Subject> {
         if let Some(ShiftedPart { first, last, .. }) = self.part() {
-            return [first, last].into_iter().cloned().map(Subject::Image).collect();
+            let subject = if self.by_images { Subject::Image } else { Subject::Stop };
+            return [first, last].into_iter().cloned().map(subject).collect();
         }
         match self.joints() {
             [] => vec![Subject::Body(self.of.clone())],

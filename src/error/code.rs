@@ -323,6 +323,7 @@ codes! {
         LengthsContradicted "lengths_contradicted" "what a tracker, given places or measured distances say contradicts the lengths of the robot's links and all else",
         PlateUneven "plate_uneven" "the plate is stretched more one way than the other",
         MeasurementsLeftOut "measurements_left_out" "measurements of trackers or contacts do not fit the others, and are left out",
+        MeasurementsRepeated "measurements_repeated" "a tracker wrote the same at successive stops though the arm had moved on: these are left out",
         MeasurementsScatter "measurements_scatter" "measurements of a tracker or of contacts scatter more than their stated sigma says",
         ImagesLeftOut "images_left_out" "many images were left out",
         ObservationsLeftOut "observations_left_out" "many observations were left out",
@@ -352,7 +353,7 @@ codes! {
         ToolContradicted "tool_contradicted" "the tool that was given is not where the touches have it",
         PlaceContradicted "place_contradicted" "a place that was touched is not where the other touches have it",
         TouchedFromBelow "touched_from_below" "the tool came from below the plane of the touched places",
-        WorkDisplaced "work_displaced" "the work object stands elsewhere from some touch on",
+        WorkDisplaced "work_displaced" "the work object, or the fixture of all sockets, stands elsewhere from some touch on",
         FramesUnknown "frames_unknown" "base and tool of the real robot are known worse than the correction is large",
         FramesNominal "frames_nominal" "base and tool were taken as nominal, as asked for",
     }

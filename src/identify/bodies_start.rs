@@ -9,24 +9,27 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::body_breaks::name_break;
 use super::body_misfit::{FEWEST_POSES, usual_misfit};
 use super::body_mistakes::name_mistake;
+use super::body_placed::{SeenFrom, missed, pairs, placed};
 use super::places_exchanged::name_exchange;
 use super::points_start::{
-    DISAGREES, FEWEST_POINTS, HOLD, Placed, PointAt, TRIMMINGS, agreeing_in_part, distances, once, point_at, posture,
-    tip_at, usual_distance,
+    DISAGREES, FEWEST_POINTS, HOLD, Placed, TRIMMINGS, lower_median, once, posture, tip_at,
 };
+use super::repeated_rows::leave_out_repeated;
+use super::rows_in_part::name_part;
+use super::unrelated_rows::name_unrelated;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
-use crate::init::{PosePair, solve_hand_eye};
 use crate::linalg::SymmetricFactor;
 use crate::linalg::median;
-use crate::problem::{Adjustment, BodyRejection, BodySeen, InstrumentKind, MeasuredSeries, Problem};
+use crate::problem::{Adjustment, BodyRejection, InstrumentKind, MeasuredSeries, Problem};
 
 /// Fills in instruments and bodies.
 ///
 /// # Errors
 /// Too few measurements of a body; poses that no closed form explains; a usual mistake that does; an instrument or a body that was moved.
 pub(super) fn start_bodies(adjustment: &mut Adjustment, series: &[MeasuredSeries], limits: &Limits) -> Result<()> {
+    leave_out_repeated(adjustment, limits);
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (k, measured) in adjustment.problem.used_bodies() {
         groups.entry((measured.instrument, measured.body)).or_default().push(k);
@@ -43,7 +46,9 @@ pub(super) fn start_bodies(adjustment: &mut Adjustment, series: &[MeasuredSeries
             name_exchange(adjustment, &measured, limits)?;
             // What fits in two parts fits no better by chance, as undone by a mistake that changes little.
             name_break(adjustment, series, (&measured, &placed), limits)?;
+            name_part(adjustment, series, (&measured, &placed), limits)?;
             name_mistake(adjustment, &measured, limits, usual_misfit)?;
+            name_unrelated(adjustment, (&measured, &placed), limits)?;
             leave_out_others(adjustment, &measured, &placed, limits);
             (adjustment.state.instruments[instrument], adjustment.state.bodies[body]) = placed;
         }
@@ -54,15 +59,17 @@ pub(super) fn start_bodies(adjustment: &mut Adjustment, series: &[MeasuredSeries
     Ok(())
 }
 
-/// Leaves out points that disagree with most of the others: they would spoil the noise of all before they are left out by their residuals. Where many
-/// do, that is no matter of single ones.
+/// Leaves out what disagrees with most of the others: it would spoil the noise of all before it is left out by its residual. Where much
+/// does, that is no matter of single ones.
 fn leave_out_others(adjustment: &mut Adjustment, measured: &[usize], placed: &Placed, limits: &Limits) {
-    let all = &adjustment.problem.body_measurements;
-    let points = measured.iter().filter(|&&k| matches!(all[k].seen, BodySeen::Point(_)));
-    let (rows, points): (Vec<usize>, Vec<PointAt>) =
-        points.filter_map(|&k| Some((k, point_at(adjustment, &all[k])?))).unzip();
-    let bound = f64::max(limits.suspicious_misfit, DISAGREES * usual_distance(&points, placed));
-    leave_far_out(&mut adjustment.problem, rows.into_iter().zip(distances(&points, placed)), bound, limits);
+    let seen = |&k: &usize| {
+        let measured = &adjustment.problem.body_measurements[k];
+        Some((k, missed(&(measured.seen, tip_at(adjustment, measured)?), placed)))
+    };
+    let all: Vec<(usize, f64)> = measured.iter().filter_map(seen).collect();
+    let usual = lower_median(all.iter().map(|(_, distance)| *distance).collect());
+    let bound = f64::max(limits.suspicious_misfit, DISAGREES * usual);
+    leave_far_out(&mut adjustment.problem, all.into_iter(), bound, limits);
 }
 
 /// Leaves out measurements that miss by more than this, m, where they are no more than may be left out of all.
@@ -101,34 +108,17 @@ fn framed(adjustment: &Adjustment, instrument: usize, measured: &[usize], limits
         let measured = &problem.body_measurements[*k];
         Some((measured.seen, tip_at(adjustment, measured)?))
     };
-    let seen: Vec<(BodySeen, Pose)> = measured.iter().filter_map(of).collect();
-    let pairs: Vec<PosePair> = seen
-        .iter()
-        .filter_map(|(seen, tip)| match seen {
-            BodySeen::Pose(pose) => Some(PosePair { camera_from_plate: *pose, chain: *tip }),
-            BodySeen::Point(_) => None,
-        })
-        .collect();
-    if pairs.len() >= FEWEST_POSES {
-        let best = solve_hand_eye(&pairs).into_iter().next();
-        return best.map(|s| (s.solution.camera, s.solution.plate)).ok_or_else(|| {
-            let place = format!("tracker {}", problem.instruments[instrument].name);
-            let remedy =
-                "check the unit, the order of the quaternion (qx, qy, qz, qw) and that the rows belong to these stops";
-            Error::new(
-                Code::ReadingsContradict,
-                place,
-                "no closed form of the hand-eye transform has a solution",
-                remedy,
-            )
-        });
-    }
-    let points: Vec<PointAt> = seen.iter().map(|(seen, tip)| (seen.position(), *tip)).collect();
-    if points.len() < FEWEST_POINTS {
-        return Err(too_few(problem, instrument, points.len(), FEWEST_POINTS));
-    }
-    agreeing_in_part(&points, limits.suspicious_misfit)
-        .ok_or_else(|| too_few(problem, instrument, points.len(), FEWEST_POINTS))
+    let seen: Vec<SeenFrom> = measured.iter().filter_map(of).collect();
+    placed(&seen, limits.suspicious_misfit).ok_or_else(|| {
+        if pairs(&seen).len() < FEWEST_POSES {
+            return too_few(problem, instrument, seen.len(), FEWEST_POINTS);
+        }
+        let place = format!("tracker {}", problem.instruments[instrument].name);
+        let remedy =
+            "check the unit, the order of the quaternion (qx, qy, qz, qw) and that the rows belong to these stops";
+        let what = "no closed form of the hand-eye transform has a solution";
+        Error::new(Code::ReadingsContradict, place, what, remedy)
+    })
 }
 
 /// Places of sockets and the body in the tip, from all sockets that hold it.

@@ -1,6 +1,7 @@
 //! The joint fit: robot, cameras, hand-camera offsets and plates directly against the pixels, with joint noise.
 
 use super::bodies_start::start_bodies;
+use super::bodies_taken_back::take_bodies_back;
 use super::build::build;
 use super::estimator::Estimator;
 use super::free_poses::{FreeStart, adjust_free_poses};
@@ -202,7 +203,7 @@ impl JointFit {
 
 /// The fit, and what was known of the joint noise before some of it was set to none.
 ///
-/// Images that were set `aside` before take part where the fit says that they belong. A fit with another robot model may be `near`, and not
+/// Images that were set `aside` before, and what was left out of bodies, take part where the fit says that they belong. A fit with another robot model may be `near`, and not
 /// quite as near one with other lenses.
 fn fit(
     mut start: Adjustment,
@@ -230,7 +231,8 @@ fn fit(
         None => estimate_components_from_above(start, &components),
     };
     for _ in 0..ROUNDS {
-        if !take_back(&mut outcome.adjustment, free, aside, &options.limits) {
+        let images = take_back(&mut outcome.adjustment, free, aside, &options.limits);
+        if !take_bodies_back(&mut outcome.adjustment, &options.limits) && !images {
             break;
         }
         outcome = estimate_components(outcome.adjustment, &components);

@@ -32,7 +32,7 @@ const STANDING_M: f64 = 1e-7;
 pub(super) const FEWEST_POINTS: usize = 4;
 
 /// Points of which half tell nine unknowns well.
-const MANY_POINTS: usize = 16;
+pub(super) const MANY_POINTS: usize = 16;
 
 /// Rounds in which points that disagree are left out of a start.
 pub(super) const TRIMMINGS: usize = 5;
@@ -90,11 +90,15 @@ pub(super) fn distances(points: &[PointAt], (frame, body): &Placed) -> Vec<f64> 
     points.iter().map(|(p, tip)| (frame.transform(p) - tip.transform(&body.translation)).norm()).collect()
 }
 
-/// The median of these, of an even number the smaller of both: half of them fit as well. Infinite where there is none.
+/// The median of these.
 pub(super) fn usual_distance(points: &[PointAt], placed: &Placed) -> f64 {
-    let mut all = distances(points, placed);
-    all.sort_by(f64::total_cmp);
-    all.get(all.len().saturating_sub(1) / 2).copied().unwrap_or(f64::INFINITY)
+    lower_median(distances(points, placed))
+}
+
+/// The middle value, of an even number the smaller of both: half of them are as small. Infinite where there is none.
+pub(super) fn lower_median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len().saturating_sub(1) / 2).copied().unwrap_or(f64::INFINITY)
 }
 
 /// Frame and body that most of the points fit, every posture counting once.
@@ -145,6 +149,11 @@ fn nearest(points: &[PointAt]) -> Option<Placed> {
 /// Sum of squared distances, m^2.
 fn misfit(points: &[PointAt], (frame, body): &Placed) -> f64 {
     points.iter().map(|(p, tip)| (frame.transform(p) - tip.transform(&body.translation)).norm_squared()).sum()
+}
+
+/// Frame and body of all points, without iterations: near enough to see which of several readings of them is right.
+pub(super) fn roughly(points: &[PointAt]) -> Option<Placed> {
+    translations(points, &all_linear(points)?.0.rotation)
 }
 
 /// `R`, `t` and `b` together; `None` where they are not determined.

@@ -9,6 +9,7 @@ use super::bases;
 use super::mistakes::shifted_rows;
 use super::parts::ends_of_parts;
 use super::suspects::{Suspects, some_of};
+use crate::assess::best_run;
 use crate::diagnose::{MistakeKind, ShiftedPart};
 use crate::init::{PosePair, SeenStop, solve_hand_eye};
 
@@ -79,33 +80,5 @@ impl Suspects<'_> {
             images: last_seen - rows.start,
             to_the_end: rows.end == n,
         }
-    }
-}
-
-/// The run with the largest sum; of several the first, without what adds nothing at its ends.
-fn best_run(gains: &[f64]) -> Range<usize> {
-    let (mut best, mut most) = (0..0, 0.0);
-    let (mut first, mut sum) = (0, 0.0);
-    for (k, gain) in gains.iter().enumerate() {
-        if sum <= 0.0 {
-            (first, sum) = (k, 0.0);
-        }
-        sum += gain;
-        if sum > most {
-            (best, most) = (first..k + 1, sum);
-        }
-    }
-    best
-}
-
-#[cfg(test)]
-mod tests {
-    use super::best_run;
-
-    #[test]
-    fn a_run_begins_and_ends_with_rows_that_gain() {
-        assert_eq!(best_run(&[-1.0, 0.0, 2.0, -0.5, 1.0, 0.0, -1.0]), 2..5);
-        assert_eq!(best_run(&[1.0, -3.0, 1.0, 1.0]), 2..4);
-        assert_eq!(best_run(&[-1.0, 0.0]), 0..0);
     }
 }

@@ -19,12 +19,15 @@ pub(super) fn rows_of_bodies(
     limits: &Limits,
 ) -> RowsOf {
     let own = measured.iter().map(|k| problem.body_measurements[*k].stop).collect();
-    let Some(table) = measured.first().map(|k| table(problem, &problem.body_measurements[*k])) else {
+    let Some((table, body)) =
+        measured.first().map(|k| &problem.body_measurements[*k]).map(|m| (table(problem, m), m.body))
+    else {
         return RowsOf::Readings;
     };
     let seen: BTreeSet<usize> = problem.used_on_robot().map(|i| problem.images[i].stop).collect();
     let images_fit = seen.len() >= limits.hand_eye_images && are_same(&own, &seen);
-    let is_other = |measured: &BodyMeasurement| self::table(problem, measured) != table;
+    // Of several targets in one table, rows of one may be shifted alone.
+    let is_other = |measured: &BodyMeasurement| self::table(problem, measured) != table || measured.body != body;
     match images_fit || bodies_fit(problem, &state.robot, (&own, is_other), limits) {
         true => RowsOf::Measured(table),
         false => RowsOf::Readings,

@@ -120,6 +120,8 @@ pub enum BodyRejection {
         /// In usual joint errors, RMS over the joints.
         usual_errors: f64,
     },
+    /// The tracker wrote the same at successive stops, to the last digit, though the arm had moved on.
+    Repeated,
     /// The caller does not want it: held out.
     Excluded,
 }
@@ -130,6 +132,9 @@ impl fmt::Display for BodyRejection {
             Self::Residual { sigmas } => write!(f, "its residual is {sigmas:.1} sigma"),
             Self::JointError { usual_errors } => {
                 write!(f, "its joint readings would have to be wrong by {usual_errors:.1} of the usual noise")
+            }
+            Self::Repeated => {
+                f.write_str("it is the same to the last digit as at another stop, though the arm had moved")
             }
             Self::Excluded => f.write_str("not asked for"),
         }

@@ -2,7 +2,7 @@
 
 use super::quaternion::{are_zeros, quaternion};
 use super::stop_index::{StopIndex, position, position_columns, refuse_twice, sigma, stop_column, target_name};
-use super::table::{Row, Table};
+use super::table::Table;
 use crate::error::Result;
 use crate::geom::Pose;
 

@@ -43,8 +43,7 @@ impl SpatialFiles {
         };
         let [points, poses, contacts] = Self::NAMES.map(&mut table);
         let [points, poses, contacts] = [points?, poses?, contacts?];
-        let (poses, no_poses) =
-            poses.map_or_else(|| Ok((Vec::new(), Vec::new())), |t| pose_file::rows(&t, &index))?;
+        let (poses, no_poses) = poses.map_or_else(|| Ok((Vec::new(), Vec::new())), |t| pose_file::rows(&t, &index))?;
         let mut all = Self {
             points: points.map_or_else(|| Ok(Vec::new()), |t| point_file::rows(&t, &index))?,
             poses,

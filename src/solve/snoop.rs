@@ -143,7 +143,7 @@ fn reject_worst(adjustment: &mut Adjustment) -> Option<Taken> {
     Some(worst)
 }
 
-/// Re-judges every measurement of a body by its residual; returns how many verdicts changed.
+/// Re-judges every measurement of a body by its residual; returns how many verdicts changed. What stays left out has the residual of this fit.
 pub fn reject_bodies(adjustment: &mut Adjustment) -> usize {
     let Adjustment { problem, state } = &*adjustment;
     let verdict = |(k, measured): (usize, &BodyMeasurement)| {
@@ -154,11 +154,11 @@ pub fn reject_bodies(adjustment: &mut Adjustment) -> usize {
         let predicted = state.instrument_from_body(measured, adjustment.body_taken_from(k))?;
         let [sigmas, bound] = measured.linearise(&predicted, problem.body_factors(measured)).length;
         let is_out = sigmas > if was_out { bound * OBSERVATION_RETURN / OBSERVATION_BOUND } else { bound };
-        (is_out != was_out).then_some((k, is_out.then_some(BodyRejection::Residual { sigmas })))
+        (is_out || was_out).then_some((k, is_out != was_out, is_out.then_some(BodyRejection::Residual { sigmas })))
     };
     let verdicts: Vec<_> = problem.body_measurements.iter().enumerate().filter_map(verdict).collect();
-    for &(k, rejected) in &verdicts {
+    for &(k, _, rejected) in &verdicts {
         adjustment.problem.body_measurements[k].rejected = rejected;
     }
-    verdicts.len()
+    verdicts.iter().filter(|(_, has_changed, _)| *has_changed).count()
 }

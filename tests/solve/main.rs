@@ -33,5 +33,6 @@ mod refits;
 mod second_pass;
 mod solver_laws;
 mod stated_lengths;
+mod tracker_rows;
 mod two_stage;
 mod zeros;

@@ -93,6 +93,8 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/points_start.rs ROUNDS", "iterations"),
     ("identify/points_start.rs STANDING_M", "iterations"),
     ("identify/points_start.rs TRIMMINGS", "iterations"),
+    ("identify/rows_in_part.rs ROUNDS", "iterations"),
+    ("identify/rows_in_part.rs TAKEN", "how many are tried"),
     ("identify/build.rs DEFAULT_SIGMA_PX", "first guess; its size is estimated"),
     ("identify/build.rs FIRST_JOINT_NOISE", "first guess"),
     ("identify/build.rs FIRST_DISPLACEMENT", "first guess"),

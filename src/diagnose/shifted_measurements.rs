@@ -1,0 +1,177 @@
+//! Do measurements that were left out one after the other fit the readings of their neighbours?
+
+use std::collections::BTreeMap;
+
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use crate::assess::{Limits, best_run, median};
+use crate::error::Code;
+use crate::problem::{
+    Adjustment, BodyMeasurement, BodyRejection, BodySeen, InstrumentKind, Problem, TakenFrom, stop_name,
+};
+
+/// Rows of a tracker that stand beside the readings of a neighbour, and are left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShiftedMeasurements {
+    /// Series and tracker.
+    pub of: [String; 2],
+    /// The first and the last stop.
+    pub stops: [String; 2],
+    /// How many there are.
+    pub rows: usize,
+    /// True where they fit the readings of the row below, else of the one above.
+    pub below: bool,
+    /// How well the worst of them does, m + rad.
+    pub misfit: f64,
+    /// True where something else that was measured at each of these stops fits its readings.
+    pub others_fit: bool,
+}
+
+/// One for every tracker and target; of targets that are shifted alike the first.
+pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ShiftedMeasurements> {
+    let problem = &adjustment.problem;
+    let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+    for (k, measured) in problem.body_measurements.iter().enumerate() {
+        if problem.instruments[measured.instrument].kind == InstrumentKind::Tracker {
+            groups.entry((measured.instrument, measured.body)).or_default().push(k);
+        }
+    }
+    let mut all: Vec<ShiftedMeasurements> = Vec::new();
+    for group in groups.values() {
+        let found = Group { adjustment, group }.shifted(setting);
+        let new = found.filter(|f| !all.iter().any(|known| known.is_like(f)));
+        all.extend(new);
+    }
+    all
+}
+
+struct Group<'a> {
+    adjustment: &'a Adjustment,
+    /// Indices of the measurements in the order of their stops.
+    group: &'a [usize],
+}
+
+impl Group<'_> {
+    fn measured(&self, row: usize) -> &BodyMeasurement {
+        &self.adjustment.problem.body_measurements[self.group[row]]
+    }
+
+    /// How far a row is from where the readings of a stop have it.
+    fn misfit(&self, row: usize, stop: usize) -> Option<f64> {
+        let Adjustment { problem, state } = self.adjustment;
+        let posture = problem.stops[stop].posture.as_ref()?;
+        let seen = state.instrument_from_body(self.measured(row), TakenFrom::exact(posture))?;
+        Some(match self.measured(row).seen {
+            BodySeen::Point(at) => (at - seen.translation).norm(),
+            BodySeen::Pose(pose) => pose.misfit(&seen),
+        })
+    }
+
+    /// The run of rows that were left out and fit those of a neighbour, in one direction and order of the stops.
+    fn shifted(&self, setting: &CheckContext) -> Option<ShiftedMeasurements> {
+        let problem = &self.adjustment.problem;
+        let used = (0..self.group.len()).filter(|row| self.measured(*row).rejected.is_none());
+        let usual = median(&used.filter_map(|row| self.misfit(row, self.measured(row).stop)).collect::<Vec<f64>>())?;
+        let own: Vec<usize> = (0..self.group.len()).map(|row| self.measured(row).stop).collect();
+        let all: Vec<usize> = (0..problem.stops.len()).collect();
+        let ways = [&all, &own].into_iter().flat_map(|order| [true, false].map(|below| (order, below)));
+        ways.filter_map(|(order, below)| self.run(order, below, usual, setting)).max_by_key(|found| found.rows)
+    }
+
+    fn run(&self, order: &[usize], below: bool, usual: f64, setting: &CheckContext) -> Option<ShiftedMeasurements> {
+        let problem = &self.adjustment.problem;
+        let limits = setting.limits;
+        let fits: Vec<Option<f64>> =
+            (0..self.group.len()).map(|row| self.as_the_neighbour(row, (order, below), usual, limits)).collect();
+        let gain = |fits: &Option<f64>| if fits.is_some() { 1.0 } else { -1.0 };
+        let rows = best_run(&fits.iter().map(gain).collect::<Vec<f64>>());
+        let shifted: Vec<usize> = rows.clone().filter(|row| fits[*row].is_some()).collect();
+        let [first, last] = [*shifted.first()?, *shifted.last()?].map(|row| self.measured(row));
+        let name = |measured: &BodyMeasurement| stop_name(setting.series, measured.read);
+        let is_seen = |row: &usize| others_fit(problem, self.measured(*row).stop);
+        (shifted.len() >= limits.moved_images).then(|| ShiftedMeasurements {
+            of: [setting.series[first.read.0].name.clone(), problem.instruments[first.instrument].name.clone()],
+            stops: [first, last].map(name),
+            rows: shifted.len(),
+            below,
+            misfit: rows.filter_map(|row| fits[row]).fold(0.0, f64::max),
+            others_fit: shifted.iter().all(is_seen),
+        })
+    }
+
+    /// How well a row that was left out fits the readings of its neighbour; `None` where it does not.
+    fn as_the_neighbour(
+        &self,
+        row: usize,
+        (order, below): (&[usize], bool),
+        usual: f64,
+        limits: &Limits,
+    ) -> Option<f64> {
+        let problem = &self.adjustment.problem;
+        let measured = self.measured(row);
+        let is_out =
+            matches!(measured.rejected, Some(BodyRejection::Residual { .. } | BodyRejection::JointError { .. }));
+        let at = order.binary_search(&measured.stop).ok().filter(|_| is_out)?;
+        let other = *order.get(if below { at + 1 } else { at.checked_sub(1)? })?;
+        let is_near = problem.stops[other].series == problem.stops[measured.stop].series;
+        let (own, as_other) = (self.misfit(row, measured.stop)?, self.misfit(row, other).filter(|_| is_near)?);
+        (as_other < usual + limits.other_readings_explain * own).then_some(as_other)
+    }
+}
+
+/// True where an image or a measurement of a body is in use at a stop.
+fn others_fit(problem: &Problem, stop: usize) -> bool {
+    problem.used().any(|(_, image)| image.stop == stop) || problem.used_bodies().any(|(_, m)| m.stop == stop)
+}
+
+impl ShiftedMeasurements {
+    /// True of another target of the same tracker in the same rows.
+    fn is_like(&self, other: &Self) -> bool {
+        (&self.of, &self.stops, self.below) == (&other.of, &other.stops, other.below)
+    }
+}
+
+impl Kind for ShiftedMeasurements {
+    fn code(&self) -> Code {
+        Code::RowsShifted
+    }
+
+    fn weight(&self) -> Weight {
+        Weight::Note
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        self.stops.iter().cloned().map(Subject::Stop).collect()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![
+            Quantity::new("measurements_shifted", self.rows as f64, "1"),
+            Quantity::new("misfit_shifted", self.misfit, "m + rad"),
+        ]
+    }
+
+    fn place(&self) -> String {
+        let [series, tracker] = &self.of;
+        format!("series {series}, {tracker}")
+    }
+
+    fn seen(&self) -> String {
+        let [first, last] = &self.stops;
+        format!(
+            "from {first} to {last} measurements and joint readings are shifted by one row: {} measurements that were left out fit the readings of the row {}",
+            self.rows,
+            if self.below { "below" } else { "above" }
+        )
+    }
+
+    fn remedy(&self) -> String {
+        let [first, last] = &self.stops;
+        let table = match self.others_fit {
+            true => "that of the tracker, and leave joints.csv as it is, which others fit",
+            false => "joints.csv or that of the tracker",
+        };
+        format!(
+            "look for a row that was lost or written twice before {first}, and shift the names of the stops by one row from there to {last} in {table}"
+        )
+    }
+}

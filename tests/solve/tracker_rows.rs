@@ -1,0 +1,216 @@
+//! Rows of a tracker that are not of their stops: shifted in part, written again, of another session, or left out at the start though they are
+//! right; and sockets that were moved together.
+
+use nalgebra::{Matrix3, Vector3};
+use robotcal::Error;
+use robotcal::diagnose::{Carried, Displaced, Finding, Subject, Weight};
+use robotcal::error::Code;
+use robotcal::geom::Pose;
+use robotcal::identify::{Options, RobotModel, Solution, identify};
+use robotcal::problem::{BodySeen, MeasuredSeries, SeenBody};
+
+use crate::measured_worlds::{Kind, World, chain, readings, stop, truth};
+use crate::support::small::Dice;
+
+const KINDS: [(Kind, f64); 2] = [(Kind::Points, 0.0), (Kind::Poses, 5e-5)];
+
+fn identified(world: &World, series: MeasuredSeries) -> Result<Solution, Error> {
+    identify(world.chain.clone(), &[series], &Options { model: RobotModel::Rigid, ..Options::default() })
+}
+
+/// A series in which the rows of a part say what the next ones do, or the ones before.
+fn shifted(world: &World, part: std::ops::Range<usize>, below: bool) -> MeasuredSeries {
+    let mut series = world.series.clone();
+    for k in part {
+        series.bodies[k].seen = world.series.bodies[if below { k + 1 } else { k - 1 }].seen;
+    }
+    series
+}
+
+fn stops(of: &[usize]) -> Vec<Subject> {
+    of.iter().map(|k| Subject::Stop(format!("{k:03}"))).collect()
+}
+
+fn found(solution: &Solution, code: Code) -> Option<&Finding> {
+    solution.findings.iter().find(|f| f.code() == code)
+}
+
+fn left_out(solution: &Solution) -> Vec<usize> {
+    let measured = solution.fit.problem.body_measurements.iter().enumerate();
+    measured.filter(|(_, m)| m.rejected.is_some()).map(|(k, _)| k).collect()
+}
+
+/// More than can be left out: there is no start of a majority, or no result that stands on it.
+#[test]
+fn a_large_part_of_the_rows_that_is_shifted_is_refused_with_its_first_stop() {
+    for (kind, sigma_rad) in KINDS {
+        let world = World::new(71, kind, 60, (3e-5, sigma_rad), 2e-5);
+        for (part, below) in [(20..41, true), (15..40, false), (30..59, true), (1..22, false)] {
+            let (first, count) = (part.start, part.len() as f64);
+            let said = identified(&world, shifted(&world, part, below)).map(|_| ()).unwrap_err();
+            assert_eq!((said.code, said.place.as_str()), (Code::RowsShifted, format!("{first:03}").as_str()), "{said}");
+            let rows = said.quantities.iter().find(|q| q.name == "images_shifted").unwrap().value;
+            assert_eq!(rows, count, "{said}");
+        }
+    }
+}
+
+/// Of few stops no start leaves any out.
+#[test]
+fn a_part_of_few_rows_is_named_too() {
+    let world = World::new(72, Kind::Points, 14, (3e-5, 0.0), 2e-5);
+    let said = identified(&world, shifted(&world, 5..9, true)).map(|_| ()).unwrap_err();
+    assert_eq!((said.code, said.place.as_str()), (Code::RowsShifted, "005"), "{said}");
+}
+
+#[test]
+fn a_small_part_that_is_shifted_is_left_out_and_named_from_its_first_stop_to_its_last() {
+    for (kind, sigma_rad) in KINDS {
+        let world = World::new(73, kind, 60, (3e-5, sigma_rad), 2e-5);
+        for below in [true, false] {
+            let solution = identified(&world, shifted(&world, 20..30, below)).unwrap();
+            let finding = found(&solution, Code::RowsShifted).unwrap();
+            assert_eq!((finding.weight(), finding.subjects()), (Weight::Note, stops(&[20, 29])));
+            assert_eq!(left_out(&solution), (20..30).collect::<Vec<usize>>());
+            assert!(found(&solution, Code::MeasurementsRepeated).is_none(), "one row twice is where the shift ends");
+        }
+    }
+}
+
+#[test]
+fn single_rows_of_other_stops_are_no_shift() {
+    for (kind, sigma_rad) in KINDS {
+        let world = World::new(74, kind, 60, (3e-5, sigma_rad), 2e-5);
+        let mut series = world.series.clone();
+        for (k, of) in [(5, 40), (6, 41), (7, 9), (30, 31), (50, 2)] {
+            series.bodies[k].seen = world.series.bodies[of].seen;
+        }
+        let solution = identified(&world, series).unwrap();
+        assert!(found(&solution, Code::RowsShifted).is_none());
+        assert_eq!(left_out(&solution), [5, 6, 7, 30, 50]);
+    }
+}
+
+#[test]
+fn what_a_stuck_tracker_wrote_again_is_left_out_and_named() {
+    for (kind, sigma_rad) in KINDS {
+        let world = World::new(75, kind, 50, (3e-5, sigma_rad), 2e-5);
+        for (last, end) in [(20, 24), (30, 50)] {
+            let mut series = world.series.clone();
+            series.bodies[last + 1..end].iter_mut().for_each(|seen| seen.seen = world.series.bodies[last].seen);
+            let solution = identified(&world, series).unwrap();
+            let of: Vec<usize> = (last + 1..end).collect();
+            assert_eq!(found(&solution, Code::MeasurementsRepeated).unwrap().subjects(), stops(&of));
+            assert_eq!(left_out(&solution), of);
+            assert!(found(&solution, Code::MeasurementsLeftOut).is_none());
+        }
+    }
+}
+
+/// A stop that is taken twice.
+#[test]
+fn a_target_that_stays_where_it_is_was_not_written_again() {
+    let world = World::new(76, Kind::Points, 40, (3e-5, 0.0), 2e-5);
+    let mut series = world.series.clone();
+    series.stops[11].readings = series.stops[10].readings.clone();
+    series.bodies[11].seen = series.bodies[10].seen;
+    let solution = identified(&world, series).unwrap();
+    assert_eq!(left_out(&solution), [0; 0]);
+}
+
+/// The nominal robot misses the one stop on the far side by far more than the others: its second axis leans.
+#[test]
+fn points_that_only_the_nominal_robot_misses_come_back() {
+    for seed in 81..87 {
+        let mut dice = Dice::new(seed);
+        let mut truth = truth(&mut dice, &chain());
+        truth.twists[1][3] += 0.05;
+        let mut k = 0;
+        let world = World::taken(dice, truth, Kind::Points, 60, (3e-5, 0.0), 2e-4, |dice| {
+            let mut q = readings(dice);
+            q[0] = if k == 30 { 2.9 } else { q[0] / 6.0 };
+            k += 1;
+            let errors = q.iter().map(|_| dice.normal(2e-4)).collect();
+            (q, errors)
+        });
+        let solution = identified(&world, world.series.clone()).unwrap();
+        assert_eq!(left_out(&solution), [0; 0], "seed {seed}");
+    }
+}
+
+/// Joint readings of one session, and the measurements of another.
+#[test]
+fn rows_of_two_sessions_are_refused() {
+    for (kind, sigma_rad) in KINDS {
+        let [world, other] = [91, 92].map(|seed| World::new(seed, kind, 40, (3e-5, sigma_rad), 2e-5));
+        let series = MeasuredSeries { stops: other.series.stops, ..world.series.clone() };
+        let said = identified(&world, series).map(|_| ()).unwrap_err();
+        assert_eq!(said.code, Code::ReadingsContradict, "{said}");
+        let value = |name: &str| said.quantities.iter().find(|q| q.name == name).unwrap().value;
+        assert!(value("misfit") > 0.5 * value("apart"), "{said}");
+    }
+}
+
+#[test]
+fn stops_of_one_name_in_two_series_are_told_apart() {
+    let world = World::new(93, Kind::Points, 60, (3e-5, 0.0), 2e-5);
+    let mut one = world.series.clone();
+    let mut two = MeasuredSeries { name: "second".into(), ..world.series.clone() };
+    two.stops = one.stops.split_off(30).into_iter().enumerate().map(|(k, s)| stop(k, s.readings.unwrap())).collect();
+    two.bodies = one.bodies.split_off(30);
+    two.bodies.iter_mut().for_each(|seen| seen.stop -= 30);
+    for series in [&mut one, &mut two] {
+        if let BodySeen::Point(at) = &mut series.bodies[7].seen {
+            at.x += 0.1;
+        }
+    }
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let solution = identify(world.chain.clone(), &[one, two], &options).unwrap();
+    let named = ["run 007", "second 007"].map(|name| Subject::Stop(name.into()));
+    assert_eq!(found(&solution, Code::MeasurementsLeftOut).unwrap().subjects(), named);
+}
+
+/// A ball in three sockets by turns, each of which is elsewhere from a stop on.
+fn by_turns(seed: u64, from: usize, shift: Vector3<f64>) -> World {
+    let mut world = World::sockets(seed, 3, 2, 5e-5, 2e-5);
+    let ball = Pose::new(Matrix3::identity(), Vector3::new(0.02, -0.03, 0.11));
+    let first: Vec<SeenBody> = (0..3).map(|socket| world.series.bodies[2 * socket].clone()).collect();
+    let place = |seen: &SeenBody| {
+        let readings = world.series.stops[seen.stop].readings.as_ref().unwrap();
+        world.truth.base_from_tip(readings).transform(&ball.translation)
+    };
+    let places: Vec<Vector3<f64>> = first.iter().map(place).collect();
+    let mut dice = Dice::new(seed + 1000);
+    let (mut stops, mut bodies) = (Vec::new(), Vec::new());
+    for k in 0..60 {
+        let at = places[k % 3] + if k < from { Vector3::zeros() } else { shift };
+        let q = (0..).find_map(|_| world.reached(&mut dice, &ball, &at)).unwrap();
+        stops.push(stop(k, q));
+        bodies.push(SeenBody { stop: k, ..first[k % 3].clone() });
+    }
+    (world.series.stops, world.series.bodies) = (stops, bodies);
+    // The places that the distances are between are off by the noise of one stop.
+    world.series.lengths.iter_mut().for_each(|length| length.sigma_m = 2e-4);
+    world
+}
+
+fn fixture(solution: &Solution) -> Option<&Displaced> {
+    solution.findings.iter().find_map(|finding| match finding {
+        Finding::Displaced(displaced) if displaced.body == Carried::Fixture => Some(displaced),
+        _ => None,
+    })
+}
+
+#[test]
+fn sockets_that_were_pushed_together_are_named_as_their_fixture() {
+    let shift = Vector3::new(1e-3, -1.5e-3, 0.8e-3);
+    for seed in [94, 95] {
+        let solution = by_turns(seed, 21, shift).solve(RobotModel::Rigid);
+        let said = fixture(&solution).unwrap_or_else(|| panic!("seed {seed}: {:?}", solution.findings));
+        assert_eq!(said.images[0], "021");
+        assert_eq!(said.places, ["socket 0", "socket 1", "socket 2"]);
+        assert!((said.distance_m.0 - shift.norm()).abs() < 5e-4, "{said:?}");
+        assert_eq!(Finding::from(said.clone()).code(), Code::WorkDisplaced);
+        assert!(fixture(&by_turns(seed, 60, shift).solve(RobotModel::Rigid)).is_none());
+    }
+}
