@@ -1,5 +1,7 @@
 //! Measurements of bodies that were left out at the start, and fit the robot that was found.
 
+use std::collections::BTreeMap;
+
 use super::body_placed::missed;
 use crate::assess::Limits;
 use crate::linalg::median;
@@ -18,20 +20,25 @@ fn misfit(adjustment: &Adjustment, k: usize) -> Option<f64> {
 /// noise in it, which that of one that is left out has, too. True where there are some.
 pub(super) fn take_bodies_back(adjustment: &mut Adjustment, limits: &Limits) -> bool {
     let problem = &adjustment.problem;
+    let is_out = |k: usize| matches!(problem.body_measurements[k].rejected, Some(BodyRejection::Residual { .. }));
+    let out: Vec<usize> = (0..problem.body_measurements.len()).filter(|k| is_out(*k)).collect();
+    if out.is_empty() {
+        return false;
+    }
     let kind = |k: usize| {
         let measured = &problem.body_measurements[k];
         (problem.instruments[measured.instrument].component, measured.seen.coordinates())
     };
-    let usual = |k: usize| {
-        let alike = problem.used_bodies().filter(|(other, _)| kind(*other) == kind(k));
-        median(&alike.filter_map(|(other, _)| misfit(adjustment, other)).collect::<Vec<f64>>())
-    };
-    let is_out = |k: &usize| matches!(problem.body_measurements[*k].rejected, Some(BodyRejection::Residual { .. }));
+    let mut used: BTreeMap<(usize, usize), Vec<f64>> = BTreeMap::new();
+    for (k, _) in problem.used_bodies() {
+        used.entry(kind(k)).or_default().extend(misfit(adjustment, k));
+    }
+    let usual: BTreeMap<(usize, usize), Option<f64>> = used.iter().map(|(kind, all)| (*kind, median(all))).collect();
     let fits = |k: &usize| {
-        let (own, usual) = (misfit(adjustment, *k), usual(*k));
-        own.zip(usual).is_some_and(|(own, usual)| own < limits.set_aside_factor * usual)
+        let usual = usual.get(&kind(*k)).copied().flatten();
+        misfit(adjustment, *k).zip(usual).is_some_and(|(own, usual)| own < limits.set_aside_factor * usual)
     };
-    let back: Vec<usize> = (0..problem.body_measurements.len()).filter(|k| is_out(k) && fits(k)).collect();
+    let back: Vec<usize> = out.into_iter().filter(fits).collect();
     back.iter().for_each(|&k| adjustment.problem.body_measurements[k].rejected = None);
     !back.is_empty()
 }

@@ -167,13 +167,18 @@ impl Read<'_> {
             let mut rows = division;
             let mut found = None;
             for _ in 0..ROUNDS {
-                let by = placed(&self.taken(&rows, ENOUGH), bound)?;
+                let taken = self.taken(&rows, ENOUGH);
+                // Parts of these were tried before.
+                let by = placed(&taken, f64::INFINITY)?;
+                if lower_median(taken.iter().map(|seen| missed(seen, &by)).collect()) > bound {
+                    return None;
+                }
                 rows = self.run(&by, bound).0;
                 found = Some(by);
             }
             found.and_then(|by| self.judged(rows, &by, limits))
         };
-        self.divisions(most).into_iter().filter_map(refined).min_by_key(|part| part.missed)
+        self.divisions(most).into_par_iter().filter_map(refined).min_by_key(|part| part.missed)
     }
 
     /// A run, where it is a part that explains what the rows miss.

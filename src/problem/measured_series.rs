@@ -127,7 +127,9 @@ pub fn stop_name(all: &[MeasuredSeries], (series, stop): (usize, usize)) -> Stri
     let Some(name) = all.get(series).and_then(|s| s.stops.get(stop)).map(|stop| &stop.image) else {
         return String::new();
     };
-    let has_it = |other: &MeasuredSeries| other.stops.iter().any(|stop| &stop.image == name);
+    let run = all[series].run.as_ref();
+    let is_of_run = |other: &MeasuredSeries| run.is_some() && other.run.as_ref() == run;
+    let has_it = |other: &MeasuredSeries| !is_of_run(other) && other.stops.iter().any(|stop| &stop.image == name);
     match all.iter().enumerate().any(|(k, other)| k != series && has_it(other)) {
         true => format!("{} {name}", all[series].name),
         false => name.clone(),
