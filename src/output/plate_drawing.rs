@@ -194,6 +194,37 @@ mod tests {
         }
     }
 
+    /// Kind and content of the chunks of a PNG file.
+    fn chunks(png: &[u8]) -> Vec<(&[u8], &[u8])> {
+        let (mut all, mut at) = (Vec::new(), 8);
+        while at < png.len() {
+            let number = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
+            let end = at + 8 + number(at) as usize;
+            assert_eq!(number(end), crc32fast::hash(&png[at + 4..end]));
+            all.push((&png[at + 4..at + 8], &png[at + 8..end]));
+            at = end + 4;
+        }
+        all
+    }
+
+    #[test]
+    fn png_states_the_resolution_with_which_it_is_drawn() {
+        let (plate, caption) = small();
+        for (dpi, per_metre) in [(100.0, 3937_u32), (150.0, 5906), (254.0, 10_000)] {
+            let bytes = png(&plate, &caption, dpi).unwrap();
+            let all = chunks(&bytes);
+            let place = all.iter().position(|(kind, _)| *kind == b"pHYs").unwrap();
+            let pixels = all.iter().position(|(kind, _)| *kind == b"IDAT").unwrap();
+            assert!(place < pixels && all.iter().filter(|(kind, _)| *kind == b"pHYs").count() == 1);
+            let stated = per_metre.to_be_bytes();
+            assert_eq!(all[place].1, [stated.as_slice(), &stated, &[1]].concat());
+            let (width, height) = image::load_from_memory(&bytes).unwrap().into_luma8().dimensions();
+            for (pixels, metres) in [(width, 0.297), (height, 0.210)] {
+                assert!((f64::from(pixels) / f64::from(per_metre) - metres).abs() <= 0.5 / f64::from(per_metre));
+            }
+        }
+    }
+
     #[test]
     fn pdf_page_is_the_sheet_to_a_micrometre() {
         let (plate, caption) = small();

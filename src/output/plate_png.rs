@@ -1,4 +1,4 @@
-//! The plate as PNG, for looking at it; for printing take the PDF.
+//! The plate as PNG, for looking at it, with its size; for printing take the PDF.
 
 use std::io::Cursor;
 
@@ -12,12 +12,16 @@ use crate::series::Plate;
 /// Samples per pixel and axis.
 const SAMPLES: i32 = 4;
 
-/// Draws the plate with `dpi` pixels per inch, edges smoothed.
+/// Signature and header of a PNG file: what follows may be a chunk of another kind.
+const HEADER: usize = 8 + 25;
+const METRES_PER_INCH: f64 = 0.0254;
+
+/// Draws the plate with `dpi` pixels per inch, edges smoothed: with a whole number of pixels per metre, as PNG states its resolution.
 ///
 /// # Errors
 /// When the picture would be larger than 400 million pixels.
 pub fn png(plate: &Plate, caption: &Caption, dpi: f64) -> Result<Vec<u8>> {
-    let scale = dpi / 0.0254;
+    let scale = (dpi / METRES_PER_INCH).round();
     let [width, height] = [caption.sheet.width_m, caption.sheet.height_m].map(|m| (m * scale).round());
     let pixels = width * height;
     if !(1.0..4e8).contains(&pixels) {
@@ -35,7 +39,17 @@ pub fn png(plate: &Plate, caption: &Caption, dpi: f64) -> Result<Vec<u8>> {
         .image
         .write_to(&mut bytes, ImageFormat::Png)
         .map_err(|e| Error::new(Code::OutputFailed, "plate picture", e, "take another --dpi"))?;
-    Ok(bytes.into_inner())
+    let mut bytes = bytes.into_inner();
+    bytes.splice(HEADER..HEADER, resolution(scale as u32));
+    Ok(bytes)
+}
+
+/// The chunk `pHYs`: pixels per metre along both axes.
+fn resolution(pixels_per_metre: u32) -> Vec<u8> {
+    let [x, y] = [pixels_per_metre.to_be_bytes(); 2];
+    let content = [b"pHYs".as_slice(), &x, &y, &[1]].concat();
+    let length = (content.len() - 4) as u32;
+    [&length.to_be_bytes(), content.as_slice(), &crc32fast::hash(&content).to_be_bytes()].concat()
 }
 
 struct Canvas {
