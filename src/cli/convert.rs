@@ -75,8 +75,9 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Verdict> {
         Some(file) => Some(read_chain(file, args.base.as_deref(), args.tip.as_deref())?),
         None => None,
     };
+    let mut verdict = Verdict::Good;
     match new {
-        None => to_recording(args, chain)?,
+        None => verdict = to_recording(args, chain)?,
         Some(new) => {
             let joints = chain.map_or_else(Vec::new, |c| c.readings);
             let extracted = convert_recording(&args.from, new.path(), &args.recording.options(&joints)?)?;
@@ -85,11 +86,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Verdict> {
         }
     }
     say_line!("written   {}", args.to.display());
-    Ok(Verdict::Good)
+    Ok(verdict)
 }
 
-/// A series folder as a recording, with the nominal tip and the observations where there are any.
-fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
+/// A series folder as a recording, with the nominal tip and the observations where there are any; not all of it where images cannot be decoded.
+fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<Verdict> {
     series::require_new(&args.to)?;
     let folder = args.to.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let _tried = ResultFolder::among(folder)?;
@@ -118,17 +119,19 @@ fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<()> {
         frames: &frames,
         marks: &marks,
     };
-    let notices = series::write_recording(&args.to, &series, shown)?;
-    let usable = series.stops.stops.iter().zip(&readings).filter(|(s, r)| s.path.is_some() && r.is_some()).count();
+    let written = series::write_recording(&args.to, &series, shown)?;
     let tip = if found.is_some() { "identified" } else { "nominal" };
-    say_line!("stops     {usable} with image, joints and {tip} tip; {} with observations marked", marks.len());
+    say_line!("stops     {} with image, joints and {tip} tip; {} with observations marked", written.stops, marks.len());
     if found.is_some() {
         say_line!("overlay   green: used, orange: left out, red: residuals, {MAGNIFIED} times their length");
     }
-    for notice in series.notices.iter().chain(&series.reading_notices(&chain)).chain(&notices) {
+    for notice in series.notices.iter().chain(&series.reading_notices(&chain)).chain(&written.notices) {
         say_line!("note      {}", notice.coded());
     }
-    Ok(())
+    for image in &written.unreadable {
+        say_line!("left out  {}", image.coded());
+    }
+    Ok(if written.unreadable.is_empty() { Verdict::Good } else { Verdict::GateFailed })
 }
 
 /// A recording has one camera, and says nothing of where the plate stood.

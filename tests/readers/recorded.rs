@@ -259,8 +259,9 @@ fn a_folder_written_as_a_recording_reads_back_the_same() {
         marks: &marks,
     };
     let path = folder.path().join("again.mcap");
-    let notices = write_recording(&path, &series, shown).unwrap();
-    assert_eq!(notices.len(), 1, "the image off the robot is told of: {notices:?}");
+    let written = write_recording(&path, &series, shown).unwrap();
+    assert_eq!((written.stops, written.unreadable.len()), (5, 0));
+    assert_eq!(written.notices.len(), 1, "the image off the robot is told of: {:?}", written.notices);
     assert_eq!(write_recording(&path, &series, shown).unwrap_err().code, Code::OutputExists);
 
     let options = RecordingOptions { joints: chain.readings.clone(), ..RecordingOptions::default() };

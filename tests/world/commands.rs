@@ -468,6 +468,47 @@ fn a_series_of_two_placements_makes_no_recording() {
     }
 }
 
+/// The others are converted, and the exit code says that it is not all.
+#[test]
+fn images_that_cannot_be_decoded_are_left_out_of_a_recording_and_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let series = folder.path().join("run");
+    std::fs::create_dir_all(series.join("images")).unwrap();
+    let dataset = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/kr6_small");
+    let images = [0, 1, 2, 3].map(|k| format!("images/img_00{k}.png"));
+    for name in ["series.toml", "plate.toml", "plate.csv"].into_iter().chain(images.iter().map(String::as_str)) {
+        std::fs::copy(dataset.join(name), series.join(name)).unwrap();
+    }
+    let joints = std::fs::read_to_string(dataset.join("joints.csv")).unwrap();
+    let rows: Vec<&str> = joints.lines().take(5).collect();
+    std::fs::write(series.join("joints.csv"), rows.join("\n") + "\n").unwrap();
+    let whole = std::fs::read(series.join(&images[1])).unwrap();
+    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let convert = |from: &Path, to: &str| {
+        let to = folder.path().join(to);
+        let output = robotcal(&["convert", from.to_str().unwrap(), to.to_str().unwrap(), "--urdf", &urdf]);
+        (output, to)
+    };
+    std::fs::write(series.join(&images[1]), &whole[..whole.len() / 2]).unwrap();
+    std::fs::write(series.join(&images[3]), "no image").unwrap();
+    let (output, recording) = convert(&series, "some.mcap");
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output));
+    for (image, is_named) in images.iter().zip([false, true, false, true]) {
+        assert_eq!(text(&output).contains(image.as_str()), is_named, "{}", text(&output));
+    }
+    assert!(text(&output).contains("[image_unreadable]"), "{}", text(&output));
+    let (output, back) = convert(&recording, "back");
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    let converted = std::fs::read_to_string(back.join("joints.csv")).unwrap();
+    assert_eq!(converted.lines().count(), 3, "{converted}");
+    for image in &images {
+        std::fs::write(series.join(image), "").unwrap();
+    }
+    let (output, recording) = convert(&series, "none.mcap");
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(!recording.exists());
+}
+
 /// A camera that is given needs no other views.
 #[test]
 fn one_image_and_a_held_camera_give_a_pose() {

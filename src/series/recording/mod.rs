@@ -7,6 +7,8 @@
 
 mod cdr;
 mod collect;
+#[cfg(feature = "mcap")]
+mod decodable;
 mod delay;
 mod extract;
 mod file;
@@ -38,4 +40,4 @@ pub use options::{Clock, Motion, Picking, RecordingOptions};
 pub use parts::is_recording;
 pub(super) use parts::written_in;
 #[cfg(feature = "mcap")]
-pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, require_new, write_recording};
+pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, Written, require_new, write_recording};

@@ -9,6 +9,7 @@ use image::ImageFormat;
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
 
+use super::decodable;
 use super::interfaces::{ANNOTATIONS, TRANSFORMS, definition};
 use super::messages::{CAMERA_INFO, COMPRESSED_IMAGE, CameraInfo, JOINT_STATE};
 use crate::error::{Code, Error, Notice, Result};
@@ -93,6 +94,17 @@ impl From<&ImageObservations> for ImageMarks {
     }
 }
 
+/// What was written of a series.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Written {
+    /// Stops in the recording.
+    pub stops: usize,
+    /// Images that cannot be decoded: their stops are left out.
+    pub unreadable: Vec<Notice>,
+    /// What else the user should know.
+    pub notices: Vec<Notice>,
+}
+
 /// Writes the stops of a series as an MCAP recording that [`super::extract`] reads back as the same series.
 ///
 /// Topics: `/joint_states`, `/camera/image/compressed` (png and jpg as they are, other formats as png), `/camera/camera_info`,
@@ -100,8 +112,8 @@ impl From<&ImageObservations> for ImageMarks {
 /// standstills, two seconds apart.
 ///
 /// # Errors
-/// A file that exists already or cannot be written, an image that cannot be read.
-pub fn write_recording(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Result<Vec<Notice>> {
+/// A file that exists already or cannot be written, a series without any stop with joint readings and an image that can be decoded.
+pub fn write_recording(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Result<Written> {
     require_new(path)?;
     let unfinished = unfinished(path);
     let done = write_stops(&unfinished, series, shown);
@@ -131,11 +143,11 @@ fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}.unfinished"))
 }
 
-fn write_stops(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Result<Vec<Notice>> {
+fn write_stops(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Result<Written> {
     let mut recording = Recording::create(path)?;
     let mut notices = Vec::new();
     let marks: BTreeMap<&str, &ImageMarks> = shown.marks.iter().map(|m| (m.image.as_str(), m)).collect();
-    let usable: Vec<(usize, &SeriesStop, &Vec<f64>, &PathBuf)> = series
+    let with_both: Vec<(usize, &SeriesStop, &Vec<f64>, &PathBuf)> = series
         .stops
         .stops
         .iter()
@@ -143,8 +155,17 @@ fn write_stops(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Res
         .enumerate()
         .filter_map(|(i, (stop, readings))| Some((i, stop, readings.as_ref()?, stop.path.as_ref()?)))
         .collect();
+    let left_out = series.stops.stops.len() - with_both.len();
+    let images: Vec<&Path> = with_both.iter().map(|(.., image)| image.as_path()).collect();
+    let refused = decodable::refused(&images);
+    let is_decodable = with_both.into_iter().zip(&refused).filter(|(_, refused)| refused.is_none());
+    let usable: Vec<_> = is_decodable.map(|(stop, _)| stop).collect();
+    let unreadable: Vec<Notice> = refused.into_iter().flatten().collect();
     if usable.is_empty() {
-        let what = "has no stop with both an image and joint readings";
+        let what = match unreadable.first() {
+            Some(first) => format!("has no stop with an image that can be decoded: {first}"),
+            None => "has no stop with both an image and joint readings".to_owned(),
+        };
         return Err(Error::new(
             Code::StopsNotRecorded,
             series.folder.display(),
@@ -152,11 +173,11 @@ fn write_stops(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Res
             "look at joints.csv and images/",
         ));
     }
-    let left_out = series.stops.stops.len() - usable.len();
     if left_out > 0 {
         let what = format!("{left_out} images off the robot, or missing, are not in the recording");
         notices.push(Notice::new(Code::StopsNotRecorded, series.folder.display(), what, ""));
     }
+    let stops = usable.len();
     let times = times(&usable.iter().map(|(_, stop, ..)| *stop).collect::<Vec<_>>());
     for (time, (i, stop, readings, image)) in times.into_iter().zip(usable) {
         for k in -(STANDING_NS / PERIOD_NS)..=STANDING_NS / PERIOD_NS {
@@ -175,7 +196,7 @@ fn write_stops(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Res
         }
     }
     recording.finish()?;
-    Ok(notices)
+    Ok(Written { stops, unreadable, notices })
 }
 
 /// Times of the stops, ns, at least so far apart that every one is a standstill of its own.
