@@ -55,7 +55,7 @@ pub(super) enum Model {
     Gear,
     /// Also gravity and backlash
     Full,
-    /// The largest of these that no smaller one beats decisively (Laplace evidence, printed) [default]
+    /// The largest of these that no smaller one beats decisively (Laplace evidence, printed)
     Auto,
 }
 

@@ -29,10 +29,10 @@ use crate::urdf::{self, Chain, JointKind, RobotDescription};
 /// Flags of `compensate`.
 #[derive(Debug, Args)]
 pub(super) struct CompensateArgs {
-    /// Program files of one language: tables (.csv), KRL (.src, .dat), RAPID (.mod) or URScript (.script)
+    /// Program files of one language that belong together: tables (.csv), KRL (.src, .dat), RAPID (.mod, .modx, .prg, .sys) or URScript (.script, .urscript)
     #[arg(value_name = "PROGRAM", required = true)]
     programs: Vec<PathBuf>,
-    /// Robot description that the controller uses, for which the program was made; with --from it is needed for poses only
+    /// Robot description by which the controller computes, and for which the program was made unless --from names another; with --from it is needed for poses only
     #[arg(long, value_name = "FILE", required_unless_present = "from")]
     nominal: Option<PathBuf>,
     /// Robot description of the robot that runs the program (a corrected URDF)
@@ -83,7 +83,7 @@ pub(super) struct CompensateArgs {
     /// External axes of the program that the description lacks move neither robot nor work (a gun, a gripper)
     #[arg(long, help_heading = "How the program is read")]
     axes_apart: bool,
-    /// Joint values near which a pose is reached where the text does not tell from where the robot comes (the first pose), in deg (mm) and in the order of the axes, separated by commas
+    /// Joint values near which a pose is reached where nothing tells its posture and from where the robot comes (the first pose): deg, of prismatic joints mm, in the order of --axes, separated by commas
     #[arg(
         long,
         value_name = "VALUES",
@@ -92,16 +92,34 @@ pub(super) struct CompensateArgs {
         help_heading = "How the program is read"
     )]
     start: Vec<f64>,
-    /// Tool where the program sets none: its numbers in the order and the units of the language, separated by commas, or as the language writes it ({X 10,Y 0,..}, p[..], [[..],[..]])
-    #[arg(long, value_name = "FRAME", allow_hyphen_values = true, help_heading = "How the program is read")]
+    /// Tool on the flange, for poses whose tool the files do not tell
+    ///
+    /// That is where the program sets none, or one that is computed or in none of the files; never for one of several that the files have.
+    /// Numbers with commas between, in the order and the units in which the controller shows them:
+    ///   krl       X,Y,Z,A,B,C            mm, degrees
+    ///   rapid     x,y,z,q1,q2,q3,q4      mm, quaternion with q1 its scalar part
+    ///   urscript  x,y,z,rx,ry,rz         m, rotation vector in rad
+    ///   csv       x,y,z,qx,qy,qz,qw      m, quaternion with qw its scalar part
+    /// or as the language writes it, in quotes:
+    ///   --tool '{X 10,Y 0,Z 150,A 0,B 0,C 0}'   --tool '[[10,0,150],[1,0,0,0]]'   --tool 'p[0.01,0,0.15,0,0,0]'
+    #[arg(
+        long,
+        value_name = "FRAME",
+        allow_hyphen_values = true,
+        verbatim_doc_comment,
+        help_heading = "How the program is read"
+    )]
     tool: Option<String>,
-    /// Work frame where the program sets none, likewise (a move of RAPID without \WObj is in wobj0)
+    /// Work frame ($BASE, work object) in the base, for poses whose work frame the files do not tell; written as --tool
+    ///
+    /// A move of RAPID without \WObj is in wobj0, and a pose of URScript in the base, whatever this says. With measured --frames it says to
+    /// which work object targets in joints, and poses of URScript, belong.
     #[arg(long, value_name = "FRAME", allow_hyphen_values = true, help_heading = "How the program is read")]
     work: Option<String>,
     /// The robot does not visit the targets in the order of the text: backlash stays out of account
     #[arg(long, help_heading = "How the program is read")]
     unordered: bool,
-    /// Ignore status and turn, or confdata: a pose means the posture next to the target before it
+    /// Ignore status and turn, or confdata: a pose means the posture next to that of the target before it, or that to which its straight path leads
     #[arg(long, help_heading = "How the program is read")]
     nearest_posture: bool,
 }

@@ -68,7 +68,7 @@ pub(super) struct PlanArgs {
     /// Tip link
     #[arg(long, value_name = "LINK", help_heading = "Robot")]
     tip: Option<String>,
-    /// Camera (ROS camera_info)
+    /// Camera (ROS camera_info, or a file of OpenCV, Kalibr or mrcal)
     #[arg(long, value_name = "FILE", help_heading = "Camera and plate")]
     camera: Option<PathBuf>,
     /// Horizontal field of view, degrees
@@ -87,17 +87,17 @@ pub(super) struct PlanArgs {
     #[arg(long, value_enum, default_value_t = Mount::Hand, help_heading = "Camera and plate")]
     mount: Mount,
     /// Camera on the flange (for a fixed camera: in the base frame), roughly: x,y,z[,roll,pitch,yaw] in m and degrees, or a file
-    /// like hand_camera.yaml [default: 80 mm before the flange, looking along its z]
+    /// like hand_camera.yaml [default: 80 mm before the flange, looking along its z; none for a fixed camera]
     #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true, help_heading = "Camera and plate")]
     hand_camera: Option<String>,
     /// Plate in the base frame (for a fixed camera: on the flange), roughly: x,y,z[,roll,pitch,yaw] in m and degrees, or a file;
-    /// several times for several places [default: on the table before the robot]
+    /// several times for several places [default: on the table before the robot; for a fixed camera 50 mm before the flange]
     #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true, help_heading = "Camera and plate")]
     plate_pose: Vec<String>,
-    /// Joint terms that shall be found
+    /// Joint terms that shall be found; auto plans for all of them
     #[arg(long, value_enum, default_value_t = Model::Rigid, help_heading = "Robot")]
     robot_model: Model,
-    /// Accuracy is meant at these joint vectors (ten or more; columns as in joints.csv, degrees), not over the workspace
+    /// Accuracy is meant at these joint vectors (ten or more; columns as in joints.csv, degrees and m), not over the workspace
     #[arg(long, value_name = "FILE", conflicts_with_all = ["d_optimal", "parameters"], help_heading = "What is to be accurate")]
     targets: Option<PathBuf>,
     /// All parameters of the robot alike, not the flange
@@ -109,7 +109,7 @@ pub(super) struct PlanArgs {
     /// Noise of an observation (sigma per axis), px
     #[arg(long, value_name = "PX", default_value_t = 0.05, help_heading = "Camera and plate")]
     pixel_noise_px: f64,
-    /// Joint noise (sigma), mrad
+    /// Joint noise (sigma), mrad; of a prismatic joint 0.1 mm for each mrad
     #[arg(long, value_name = "MRAD", default_value_t = 0.03, help_heading = "Camera and plate")]
     joint_noise_mrad: f64,
     /// Nearest and farthest distance from camera to plate, m
