@@ -40,8 +40,8 @@ use switching::{Now, Switching};
 use untold::Untold;
 use uses::Use;
 use value::{
-    Displacement, NO_AXIS, Node, TYPES, array_of, check, computed, element, foreign_axis, is_set, node, numbers,
-    undeclared,
+    Displacement, NO_AXIS, Node, TYPES, array_of, check, computed, element, foreign_axis, is_of_external_axes, is_set,
+    node, numbers, undeclared,
 };
 
 const DIALECT: Dialect =
@@ -352,6 +352,10 @@ impl Task<'_> {
             return Err(Why::new(LeftReason::NotATarget, "it is no robtarget and no jointtarget"));
         };
         let external = parts.last().and_then(numbers::<6>).unwrap_or_default();
+        if is_of_external_axes(value) {
+            let words = "it moves external axes alone: the arm stays where it is";
+            return Err(Why::new(LeftReason::NotATarget, words));
+        }
         if parts.len() == 2 {
             let frames = Box::new(self.beside_joints(tool, work));
             return Ok(TargetKind::Joints(JointTarget { frames, ..self.joints(&parts[0], &external, file)? }));

@@ -3,7 +3,7 @@
 use super::switched::{DISPLACES, OFFSETS};
 use super::untold::Untold;
 use super::uses::{Does, Use};
-use super::value::{Node, array_of, element, node};
+use super::value::{Node, array_of, element, is_of_external_axes, node};
 use super::{Datum, Task};
 use crate::error::Result;
 use crate::geom::Pose;
@@ -94,6 +94,10 @@ impl Task<'_> {
             };
             // Its numbers are those of another, and stand there.
             if self.meant(&name) != name && self.declared(&name).is_ok() {
+                continue;
+            }
+            // Nothing of it is the arm's.
+            if is_of_external_axes(&value) {
                 continue;
             }
             let place = (datum.file, datum.line);

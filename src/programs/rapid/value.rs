@@ -224,6 +224,13 @@ pub(super) fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result
 /// An external axis that is not there.
 pub(super) const NO_AXIS: f64 = 9e9;
 
+/// True for a jointtarget in which all axes of the arm stay where they are.
+pub(super) fn is_of_external_axes(target: &Node) -> bool {
+    let Node::List(parts) = target else { return false };
+    let arm = parts.first().filter(|_| parts.len() == 2).and_then(numbers::<6>);
+    arm.is_some_and(|axes| axes.iter().all(|(value, _)| *value >= NO_AXIS))
+}
+
 /// The first external axis behind the `known` axes, the robot's six included, that is not at zero.
 pub(super) fn foreign_axis(external: &[(f64, Range<usize>); 6], known: usize) -> Option<(String, f64)> {
     let foreign = external.iter().map(|(value, _)| *value).zip("abcdef".chars()).skip(known.saturating_sub(6));
