@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+pub(super) use super::held::Held;
 use super::routines::Routines;
 use crate::error::Result;
 
@@ -13,43 +14,6 @@ const MOST_READINGS: usize = 24;
 /// Why something is not known.
 const BRANCHES: &str = "it is set in a branch or a loop";
 const CALLS: &str = "it is not the same at all calls of the routine";
-
-/// One thing that statements set.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Held<V> {
-    /// What holds.
-    pub value: V,
-    /// True where the routine has set it.
-    is_set: bool,
-}
-
-impl<V: Clone + PartialEq> Held<V> {
-    /// Not set by the routine.
-    pub fn new(value: V) -> Self {
-        Self { value, is_set: false }
-    }
-
-    /// A statement sets it.
-    pub fn set(&mut self, value: V) {
-        *self = Self { value, is_set: true };
-    }
-
-    /// Where either holds, with what `differing` values leave.
-    pub fn merged(&self, other: &Self, differing: impl FnOnce(&V, &V) -> V) -> Self {
-        let value = if self.value == other.value { self.value.clone() } else { differing(&self.value, &other.value) };
-        Self { value, is_set: self.is_set || other.is_set }
-    }
-
-    /// The same at the top of a routine.
-    pub fn at_top(&self) -> Self {
-        Self::new(self.value.clone())
-    }
-
-    /// Behind a call of a routine that ended with `end`.
-    pub fn behind_call(&self, end: &Self) -> Self {
-        if end.is_set { end.clone() } else { self.clone() }
-    }
-}
 
 /// All that statements set.
 pub(super) trait Followed: Clone + PartialEq {
@@ -190,6 +154,11 @@ struct Routine<T> {
 fn merged<T: Followed>(all: &[T]) -> Option<T> {
     let (first, others) = all.split_first()?;
     Some(others.iter().fold(first.clone(), |one, other| one.merged(other, BRANCHES)))
+}
+
+/// Name of a part of a routine; no routine has a blank in its name.
+fn part_name(routine: &str, part: &str) -> String {
+    format!("{routine} {part}")
 }
 
 impl<T: Followed> Flow<T> {
@@ -341,6 +310,27 @@ impl<T: Followed> Flow<T> {
     /// What follows is reached by a jump alone.
     pub fn goes_elsewhere(&mut self) {
         self.is_reached = false;
+    }
+
+    /// A part of the innermost routine ends, as its handler, behind which the robot goes on elsewhere in the routine.
+    pub fn part_ends(&mut self, part: &str, now: &T) {
+        if let Some(routine) = self.routines.last().filter(|_| self.is_reached) {
+            let name = part_name(&routine.name, part);
+            self.passes(&name, now);
+        }
+        self.goes_elsewhere();
+    }
+
+    /// What goes on under this name has passed through what holds here.
+    pub fn passes(&mut self, name: &str, now: &T) {
+        let ends = self.found.ends.entry(name.to_owned());
+        ends.and_modify(|all| *all = all.merged(now, BRANCHES)).or_insert_with(|| now.clone());
+    }
+
+    /// What holds where a part of the innermost routine has run from here.
+    pub fn behind_part(&self, part: &str, now: &T) -> Option<T> {
+        let name = part_name(&self.routines.last()?.name, part);
+        Some(now.behind_call(self.known.ends.get(&name)?))
     }
 
     fn ends_with(&mut self, now: &T) {

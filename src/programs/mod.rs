@@ -10,6 +10,7 @@
 //! | [`measured_frames`], `frame_candidates` | tool and work object of the real robot instead of those of the program, and which of these they are |
 //! | [`mod@compensate`] | targets of one robot to targets of another |
 //! | `flow` | what statements set, followed through branches, loops and calls |
+//! | `held` | one thing that statements set |
 //! | `references` | what routines change that is given them by reference |
 //! | `routines` | which routine a call means where several files have one of its name |
 //! | `names` | names that stand for something else in one module than in another |
@@ -27,6 +28,7 @@ mod flow;
 mod foreign;
 mod frame_candidates;
 mod frame_text;
+mod held;
 mod itinerary;
 mod krl;
 mod language;

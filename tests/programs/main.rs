@@ -23,6 +23,7 @@ mod plan_choice;
 mod plan_poses;
 mod promise;
 mod rapid;
+mod rapid_handlers;
 mod rapid_statements;
 mod references;
 mod retarget;

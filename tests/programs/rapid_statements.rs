@@ -29,7 +29,7 @@ fn module(cell: &Cell, body: &str) -> String {
     text
 }
 
-fn run(cell: &Cell, body: &str, flags: &[&str]) -> (String, Run) {
+pub(super) fn run(cell: &Cell, body: &str, flags: &[&str]) -> (String, Run) {
     let text = module(cell, body);
     let file = cell.write("m.mod", text.as_bytes());
     (text, cell.compensate(&[&file], &[&["--unordered"], flags].concat()))
@@ -294,10 +294,15 @@ fn moves_whose_path_something_else_corrects_are_left() {
         ),
         (format!("CorrCon id;\nMoveL @,v1,z1,tGun{work}\nMoveAbsJ #,v1,z1,tGun;"), 2, vec![]),
     ] {
-        let told = run(&cell, &body, &[]).1.told();
-        let found: Vec<&str> = told.left.iter().map(|(.., reason)| reason.as_str()).collect();
-        assert_eq!((told.corrected, found), (corrected, left), "{body}");
+        assert_told(&cell, &body, corrected, &left);
     }
+}
+
+/// Asserts how many targets are corrected, and the reasons of those that are left.
+pub(super) fn assert_told(cell: &Cell, body: &str, corrected: usize, left: &[&str]) {
+    let told = run(cell, body, &[]).1.told();
+    let found: Vec<&str> = told.left.iter().map(|(.., reason)| reason.as_str()).collect();
+    assert_eq!((told.corrected, found), (corrected, left.to_vec()), "{body}");
 }
 
 /// Where an instruction fails, or a routine that it calls, the handler is entered with what held there.
@@ -323,9 +328,19 @@ fn a_handler_of_rapid_begins_with_all_that_its_routine_has_passed_through() {
                 vec![LeftReason::PostureUnknown.name()],
             ),
         ] {
-            let told = run(&cell, &body, &[]).1.told();
-            let found: Vec<&str> = told.left.iter().map(|(.., reason)| reason.as_str()).collect();
-            assert_eq!((told.corrected, found), (corrected, left), "{body}");
+            assert_told(&cell, &body, corrected, &left);
         }
     }
+}
+
+/// `MoveExtJ` leaves the arm where it is.
+#[test]
+fn a_jointtarget_of_external_axes_alone_is_none_of_the_arm() {
+    let cell = Cell::kuka(351);
+    let step = "MoveJ @,v1,z1,tGun\\WObj:=wTable;";
+    let none = "9E9,9E9,9E9,9E9,9E9,9E9";
+    let external = format!("[[{none}],[10,9E9,9E9,9E9,9E9,9E9]]");
+    let declared = format!("MoveExtJ jExt,v1,z1;\n{step}\nENDPROC\nCONST jointtarget jExt:={external};\nPROC Last()");
+    assert_told(&cell, &declared, 1, &[]);
+    assert_told(&cell, &format!("MoveAbsJ {external},v1,z1,tGun;\n{step}"), 1, &[LeftReason::NotATarget.name()]);
 }

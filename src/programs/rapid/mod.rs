@@ -242,7 +242,8 @@ impl Task<'_> {
         };
         let kind = self.kind(&value, place.0, tool.as_deref(), self.work(work));
         let about = |why: Why| Why { about: Some(named.clone()), ..why };
-        Ok(kind.map_err(about).and_then(|kind| self.add(named, place, self.with_posture(kind, name))))
+        let kind = kind.and_then(|kind| self.as_told(kind, name)).map_err(about);
+        Ok(kind.and_then(|kind| self.add(named, place, kind)))
     }
 
     /// The name whose numbers a name has: `CONST robtarget name:=other;`.
@@ -268,17 +269,22 @@ impl Task<'_> {
         }
     }
 
-    /// The posture that a kind of move gives a target.
-    fn with_posture(&self, kind: TargetKind, name: &str) -> TargetKind {
-        let TargetKind::Pose(mut pose) = kind else { return kind };
+    /// A target with the posture that a kind of move gives it; refused where the tool is turned otherwise than it says.
+    fn as_told(&self, kind: TargetKind, name: &str) -> Understood<TargetKind> {
+        let TargetKind::Pose(mut pose) = kind else { return Ok(kind) };
         let upper = name.to_ascii_uppercase();
+        if !is_of_joints(&upper) && *self.switching.now().locked.value() {
+            let words =
+                "axis 4 is locked, or may be (SingArea\\LockAxis4): the tool turns as it can, whatever the target says";
+            return Err(Why::new(LeftReason::OrientationKept, words));
+        }
         let near = if upper.starts_with("MOVEL") { MeantPosture::Along } else { MeantPosture::Nearest };
         pose.posture = match (*self.switching.now().watched[usize::from(!is_of_joints(&upper))].value(), pose.posture) {
             (Watched::Off, _) => near,
             (Watched::Unknown, MeantPosture::Coded(codes, axes)) => MeantPosture::Either(codes, axes),
             (_, posture) => posture,
         };
-        TargetKind::Pose(pose)
+        Ok(TargetKind::Pose(pose))
     }
 
     /// A move to `Offs(p, ..)` or `RelTool(p, ..)`.
@@ -298,7 +304,7 @@ impl Task<'_> {
             Why::of(point, LeftReason::Computed, words).starting_from(vec![declared])
         })?;
         let base = self.kind(&value, file, tool, self.work(work))?;
-        let base = self.with_posture(base, name);
+        let base = self.as_told(base, name)?;
         let place = (file, base.first_byte());
         let TargetKind::Pose(mut pose) = base.clone() else {
             return Err(Why::of(point, LeftReason::NotATarget, format!("{point} is no robtarget")));

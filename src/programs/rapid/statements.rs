@@ -44,6 +44,11 @@ const LED: [&str; 2] = ["CORR", "TRACK"];
 /// Words between two operands.
 pub(super) const OPERATORS: [&str; 6] = ["AND", "OR", "XOR", "NOT", "DIV", "MOD"];
 
+/// True for the first word of a statement that declares data.
+fn declares(word: &str) -> bool {
+    DECLARE.contains(&word) || TYPES.contains(&word)
+}
+
 pub(super) fn is_control(reader: &Reader<'_>) -> bool {
     reader.name().is_some_and(|word| CONTROL.contains(&word.as_str()))
 }
@@ -222,6 +227,7 @@ impl Task<'_> {
                 self.switching.within(&word, &mut self.way);
                 reader.at += 1;
             } else if let Some(targets) = self.move_to(&reader, &word) {
+                self.switching.before(&word);
                 self.instruction(&mut reader, targets)?;
                 reader.at += 1;
             } else if CONTROL.contains(&word.as_str()) {
@@ -237,7 +243,10 @@ impl Task<'_> {
                 if is_label {
                     self.switching.label(&mut self.way);
                 }
-                self.no_move(&mut reader, &word, begins)?;
+                if !declares(&word) {
+                    self.switching.before(&word);
+                    self.no_move(&mut reader, &word, begins)?;
+                }
                 self.switching.statement(&reader, &word, &mut self.way);
                 reader.at += 1;
             }
@@ -247,9 +256,6 @@ impl Task<'_> {
 
     /// What a statement that is no known move says of positions.
     fn no_move(&mut self, reader: &mut Reader<'_>, word: &str, end: usize) -> Result<()> {
-        if DECLARE.contains(&word) || TYPES.contains(&word) {
-            return Ok(());
-        }
         if has_literal(reader, end)? {
             let words = format!("a position stands in it, and what {word} does with it is not known");
             self.leave((reader.index, reader.line()), word, Why::new(LeftReason::NotATarget, words));

@@ -1,5 +1,7 @@
 //! What instructions switch for all moves behind them: checks of configurations, displacements.
 
+use std::collections::BTreeSet;
+
 use crate::programs::flow::{Followed, Held};
 use crate::programs::scan::Reader;
 
@@ -35,6 +37,13 @@ impl Either for bool {
     }
 }
 
+/// Names, of which all may hold.
+impl Either for BTreeSet<String> {
+    fn either(&self, other: &Self) -> Self {
+        self | other
+    }
+}
+
 /// One thing that instructions switch.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Switch<V> {
@@ -51,6 +60,11 @@ impl<V: Either + Clone + PartialEq> Switch<V> {
     /// What holds.
     pub fn value(&self) -> &V {
         &self.held.value
+    }
+
+    /// What holds where the text begins.
+    pub fn begin(&mut self, value: V) {
+        *self = Self::new(value);
     }
 
     /// An instruction switches it.
@@ -70,6 +84,13 @@ impl<V: Either + Clone + PartialEq> Switch<V> {
             self.held.set(self.value().either(passed).either(top.value()));
         }
         self
+    }
+
+    /// The same where a routine that ends so may have been left at any of its statements.
+    fn or_left_by(&mut self, end: &Self) {
+        if let Some(passed) = &end.passed {
+            self.set(self.value().either(passed));
+        }
     }
 
     fn merged(&self, other: &Self) -> Self {
@@ -103,12 +124,17 @@ pub(super) struct Switched {
     pub displaced: Switch<bool>,
     /// True where an offset of external axes may be active.
     pub offset: Switch<bool>,
+    /// True where axis 4 may be locked, so that the tool turns as it can.
+    pub locked: Switch<bool>,
+    /// Trap routines that an interrupt may run at any time.
+    pub beside: Switch<BTreeSet<String>>,
 }
 
 impl Switched {
     /// Where nothing has switched anything yet.
-    pub fn new(watched: [Watched; 2], displaced: bool, offset: bool) -> Self {
-        Self { watched: watched.map(Switch::new), displaced: Switch::new(displaced), offset: Switch::new(offset) }
+    pub fn new(watched: [Watched; 2], [displaced, offset, locked]: [bool; 3]) -> Self {
+        let [displaced, offset, locked] = [displaced, offset, locked].map(Switch::new);
+        Self { watched: watched.map(Switch::new), displaced, offset, locked, beside: Switch::new(BTreeSet::new()) }
     }
 
     /// Notes what another has passed through.
@@ -116,6 +142,17 @@ impl Switched {
         self.watched.iter_mut().zip(&other.watched).for_each(|(own, other)| own.note(other));
         self.displaced.note(&other.displaced);
         self.offset.note(&other.offset);
+        self.locked.note(&other.locked);
+        self.beside.note(&other.beside);
+    }
+
+    /// The same where a routine that ends so may have been left at any of its statements.
+    pub fn or_left_by(&mut self, end: &Self) {
+        self.watched.iter_mut().zip(&end.watched).for_each(|(own, end)| own.or_left_by(end));
+        self.displaced.or_left_by(&end.displaced);
+        self.offset.or_left_by(&end.offset);
+        self.locked.or_left_by(&end.locked);
+        self.beside.or_left_by(&end.beside);
     }
 
     /// The same where any statement of the routine may have been the last one: it began with `top`, which has noted all that it passed through.
@@ -125,6 +162,8 @@ impl Switched {
             watched: [joints.anywhere(&top.watched[0]), paths.anywhere(&top.watched[1])],
             displaced: self.displaced.anywhere(&top.displaced),
             offset: self.offset.anywhere(&top.offset),
+            locked: self.locked.anywhere(&top.locked),
+            beside: self.beside.anywhere(&top.beside),
         }
     }
 }
@@ -135,6 +174,8 @@ impl Followed for Switched {
             watched: [0, 1].map(|k| self.watched[k].merged(&other.watched[k])),
             displaced: self.displaced.merged(&other.displaced),
             offset: self.offset.merged(&other.offset),
+            locked: self.locked.merged(&other.locked),
+            beside: self.beside.merged(&other.beside),
         }
     }
 
@@ -143,6 +184,8 @@ impl Followed for Switched {
             watched: self.watched.each_ref().map(Switch::at_top),
             displaced: self.displaced.at_top(),
             offset: self.offset.at_top(),
+            locked: self.locked.at_top(),
+            beside: self.beside.at_top(),
         }
     }
 
@@ -151,8 +194,16 @@ impl Followed for Switched {
             watched: [0, 1].map(|k| self.watched[k].behind_call(&end.watched[k])),
             displaced: self.displaced.behind_call(&end.displaced),
             offset: self.offset.behind_call(&end.offset),
+            locked: self.locked.behind_call(&end.locked),
+            beside: self.beside.behind_call(&end.beside),
         }
     }
+}
+
+/// `SingArea \LockAxis4`, `SingArea \Off`: true where axis 4 is locked; the reader stands on the name.
+pub(super) fn locks(reader: &Reader<'_>) -> Option<bool> {
+    let is_switch = reader.ahead_is_word(0, "SINGAREA") && reader.ahead_is_mark(1, b'\\');
+    is_switch.then(|| reader.ahead_is_word(2, "LOCKAXIS4"))
 }
 
 /// `ConfJ \Off`, `ConfL \On`: which check, and its state; the reader stands on the name.

@@ -1,6 +1,8 @@
 //! What instructions of RAPID switch for all behind them, followed through routines, branches and loops.
 
-use super::switched::{DISPLACES, OFFSETS, Switched, Watched, switch};
+use std::collections::BTreeSet;
+
+use super::switched::{DISPLACES, OFFSETS, Switched, Watched, locks, switch};
 use crate::programs::flow::{Branching, Flow, Followed, Places};
 use crate::programs::itinerary::{Itinerary, Stands};
 use crate::programs::routines::Routines;
@@ -8,6 +10,23 @@ use crate::programs::scan::{Reader, TokenKind};
 
 /// Beginnings of routines.
 pub(super) const ROUTINES: [&str; 3] = ["PROC", "FUNC", "TRAP"];
+
+/// Ends of a handler of errors behind which its routine goes on: where it failed, and behind that.
+const RETRY: &str = "RETRY";
+const TRY_NEXT: &str = "TRYNEXT";
+/// Instructions that do not fail.
+const SURE: [&str; 7] = ["CONFJ", "CONFL", "EOFFSOFF", "EOFFSSET", "PDISPOFF", "PDISPSET", "SINGAREA"];
+
+/// The trap routine in `CONNECT .. WITH NAME`, on whose first word the reader stands.
+fn connected(reader: &Reader<'_>) -> Option<String> {
+    if !reader.ahead_is_word(0, "CONNECT") {
+        return None;
+    }
+    let is_there = |k: &usize| reader.token(*k).is_some_and(|t| t.kind != TokenKind::Mark(b';'));
+    let is_with = |k: &usize| reader.name_of(*k).is_some_and(|word| word == "WITH");
+    let with = (reader.at..).take_while(is_there).find(is_with)?;
+    reader.name_of(with + 1)
+}
 
 /// Words between that with which a routine begins and its name: `PROC NAME(..)`, `FUNC TYPE NAME(..)`, `TRAP NAME`.
 pub(super) fn words_before_name(word: &str) -> usize {
@@ -31,18 +50,37 @@ pub(super) struct Switching {
     displaces: bool,
     /// The same of an offset of external axes.
     offsets: bool,
+    /// True where a routine locks axis 4.
+    locks: bool,
+    /// Trap routines of all texts that interrupts run.
+    connected: BTreeSet<String>,
     now: Now,
     /// What held where the routine began, and what it has passed through since.
     top: Switched,
+    /// What held where the handler of errors began that is being read: it is read as a routine of its own.
+    handler: Option<Now>,
+    /// True behind a statement of the routine that may fail.
+    may_have_failed: bool,
     flow: Flow<Now>,
 }
 
 impl Switching {
     /// With what the reading before found, and the routines of the files.
     pub fn new(known: Places<Now>, routines: &Routines) -> Self {
-        let top = Switched::new([Watched::On; 2], false, false);
+        let top = Switched::new([Watched::On; 2], [false; 3]);
         let (now, flow) = ((top.clone(), Stands::default()), Flow::new(known).among(routines));
-        Self { switched_off: [false; 2], displaces: false, offsets: false, now, top, flow }
+        Self {
+            switched_off: [false; 2],
+            displaces: false,
+            offsets: false,
+            locks: false,
+            connected: BTreeSet::new(),
+            now,
+            top,
+            handler: None,
+            may_have_failed: false,
+            flow,
+        }
     }
 
     /// A file begins.
@@ -77,6 +115,7 @@ impl Switching {
 
     /// Which checks of configurations are switched off anywhere in a text, and whether a displacement is begun.
     pub fn look_through(&mut self, mut reader: Reader<'_>) {
+        self.flow.file_begins(reader.index);
         while !reader.done() {
             if let Some((which, Watched::Off)) = switch(&reader) {
                 self.switched_off[which] = true;
@@ -85,6 +124,8 @@ impl Switching {
             let is_of = |all: [&str; 2]| name.as_ref().is_some_and(|word| all.contains(&word.as_str()));
             self.displaces |= is_of(DISPLACES);
             self.offsets |= is_of(OFFSETS);
+            self.locks |= locks(&reader) == Some(true);
+            connected(&reader).iter().for_each(|trap| self.connected.extend(self.flow.meant(trap)));
             reader.at += 1;
         }
     }
@@ -98,6 +139,14 @@ impl Switching {
         if let Some((which, state)) = switch(reader) {
             self.now.0.watched[which].set(state);
         }
+        if let Some(is_locked) = locks(reader) {
+            self.now.0.locked.set(is_locked);
+        }
+        if let Some(trap) = connected(reader) {
+            let mut all = self.now.0.beside.value().clone();
+            all.extend(self.flow.meant(&trap));
+            self.now.0.beside.set(all);
+        }
         match word {
             w if ROUTINES.contains(&w) => {
                 way.start_afresh();
@@ -107,8 +156,16 @@ impl Switching {
                 // Modules that are not given may call it, too.
                 self.now = self.now.merged(&uncalled, "");
                 self.top = self.now.0.clone();
+                (self.handler, self.may_have_failed) = (None, false);
+                if word == "TRAP" {
+                    // Interrupts wait for its end.
+                    self.now.0.beside.begin(BTreeSet::new());
+                }
             }
-            "ENDPROC" | "ENDFUNC" | "ENDTRAP" => self.flow.routine_ends(&mut self.now),
+            "ENDPROC" | "ENDFUNC" | "ENDTRAP" => {
+                self.part_ends();
+                self.flow.routine_ends(&mut self.now);
+            }
             "IF" => self.begin(Branching::If, way),
             "TEST" => self.begin(Branching::Cases, way),
             "WHILE" | "FOR" => self.begin(Branching::Loop, way),
@@ -118,9 +175,15 @@ impl Switching {
             }
             "ERROR" | "UNDO" | "BACKWARD" => {
                 // From anywhere in the routine.
+                self.part_ends();
                 self.flow.returns(&self.now);
                 self.now.0 = self.now.0.clone().anywhere(&self.top);
                 way.lose(&mut self.now.1);
+                if word == "ERROR" {
+                    self.flow.arrives();
+                    let top = self.now.at_top();
+                    self.handler = Some(std::mem::replace(&mut self.now, top));
+                }
             }
             "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => self.branches_end(way),
             _ => self.step(word, way),
@@ -131,7 +194,56 @@ impl Switching {
     /// All that the routines of the files may have switched.
     fn anything(&self, is_displaced: bool) -> Switched {
         let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
-        Switched::new(self.switched_off.map(state), self.displaces && is_displaced, self.offsets && is_displaced)
+        let on = [self.displaces, self.offsets, self.locks].map(|on| on && is_displaced);
+        let mut any = Switched::new(self.switched_off.map(state), on);
+        if is_displaced {
+            any.beside.begin(self.connected.clone());
+        }
+        any
+    }
+
+    /// The body of a routine, or its handler of errors, is read to its end.
+    fn part_ends(&mut self) {
+        self.goes_on_behind_failure();
+        self.now = self.since_routine_began();
+        self.handler = None;
+    }
+
+    /// What holds here seen from the routine, in its handler as well.
+    fn since_routine_began(&self) -> Now {
+        self.handler.as_ref().map_or_else(|| self.now.clone(), |begun| begun.behind_call(&self.now))
+    }
+
+    /// What interrupts and the handler of errors may have done before a statement, or a move, of this name.
+    pub fn before(&mut self, word: &str) {
+        self.goes_on_behind_failure();
+        let may_fail = !SURE.contains(&word);
+        if may_fail {
+            self.goes_on_from(RETRY);
+        }
+        self.may_have_failed = may_fail;
+        for trap in self.now.0.beside.value().clone() {
+            self.flow.begins_beside(&trap, &self.now);
+            if let Some((behind, _)) = self.flow.behind(&trap, &self.now) {
+                self.now.0 = self.now.0.merged(&behind, "");
+            }
+        }
+        self.top.note(&self.now.0);
+    }
+
+    fn goes_on_behind_failure(&mut self) {
+        if self.may_have_failed {
+            self.goes_on_from(TRY_NEXT);
+        }
+    }
+
+    /// The handler may have led here; errors in itself are those of the caller.
+    fn goes_on_from(&mut self, end: &str) {
+        if self.handler.is_none()
+            && let Some(behind) = self.flow.behind_part(end, &self.now)
+        {
+            self.now = self.now.merged(&behind, "");
+        }
     }
 
     /// `name:`, to which GOTO may come from anywhere in the routine.
@@ -159,14 +271,40 @@ impl Switching {
     /// A statement without branches.
     fn step(&mut self, word: &str, way: &mut Itinerary) {
         match word {
-            "RETURN" => self.flow.returns(&self.now),
+            "RETURN" => self.flow.returns(&self.since_routine_began()),
+            RETRY | TRY_NEXT if self.handler.is_some() => self.flow.part_ends(word, &self.now),
+            "RAISE" if self.handler.is_some() => self.raises(),
             "GOTO" => self.flow.goes_elsewhere(),
             w if DISPLACES.contains(&w) => self.now.0.displaced.set(true),
             w if OFFSETS.contains(&w) => self.now.0.offset.set(true),
             "PDISPOFF" => self.now.0.displaced.set(false),
             "EOFFSOFF" => self.now.0.offset.set(false),
-            _ => way.call(word.to_owned(), &mut self.flow, &mut self.now),
+            _ => {
+                self.may_have_failed_within(word, RETRY);
+                way.call(word.to_owned(), &mut self.flow, &mut self.now);
+                self.may_have_failed_within(word, TRY_NEXT);
+            }
         }
+    }
+
+    /// A routine that a statement calls, and that fails, hands its error on to the handler of this one, which goes on so.
+    fn may_have_failed_within(&mut self, routine: &str, end: &str) {
+        if self.handler.is_some() || !self.flow.has_routine(routine) || self.flow.behind_part(end, &self.now).is_none()
+        {
+            return;
+        }
+        let nothing = (Switched::new([Watched::On; 2], [false; 3]), Stands::default());
+        if let Some((left, _)) = self.flow.behind(routine, &nothing) {
+            self.now.0.or_left_by(&left);
+        }
+    }
+
+    /// The handler hands the error on to that of the caller, which may go on with what this one has switched.
+    fn raises(&mut self) {
+        if self.handler.as_ref().is_some_and(|begun| begun.0.at_top() != self.now.0) {
+            self.flow.returns(&self.since_routine_began());
+        }
+        self.flow.goes_elsewhere();
     }
 
     fn begin(&mut self, kind: Branching, way: &mut Itinerary) {
