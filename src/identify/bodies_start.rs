@@ -11,9 +11,7 @@ use super::body_misfit::{FEWEST_POSES, usual_misfit};
 use super::body_mistakes::name_mistake;
 use super::body_placed::{SeenFrom, missed, pairs, placed};
 use super::places_exchanged::name_exchange;
-use super::points_start::{
-    DISAGREES, FEWEST_POINTS, HOLD, Placed, TRIMMINGS, lower_median, once, posture, tip_at,
-};
+use super::points_start::{DISAGREES, FEWEST_POINTS, HOLD, Placed, TRIMMINGS, lower_median, once, posture, tip_at};
 use super::repeated_rows::leave_out_repeated;
 use super::rows_in_part::name_part;
 use super::unrelated_rows::name_unrelated;

@@ -12,7 +12,9 @@ use crate::diagnose::{Finding, Mistake};
 use crate::error::{Code, Error, Quantity, Result};
 use crate::fit::FreePoses;
 use crate::geom::log_so3;
-use crate::init::{HandEye, HandEyeStart, PosePair, SeenStop, Zeros, hand_eye_misfit, shah, solve_hand_eye, solve_zeros};
+use crate::init::{
+    HandEye, HandEyeStart, PosePair, SeenStop, Zeros, hand_eye_misfit, shah, solve_hand_eye, solve_zeros,
+};
 use crate::linalg::median;
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;

@@ -62,7 +62,9 @@ pub use recording::{
     CameraInfo, Clock, Delay, Extracted, Motion, Picking, RecordingOptions, StopReport, extract, is_recording,
 };
 #[cfg(feature = "mcap")]
-pub use recording::{FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, Written, require_new, write_recording};
+pub use recording::{
+    FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, Written, require_new, write_recording,
+};
 pub use rotation_kind::RotationKind;
 pub use run::Run;
 pub use sections::{

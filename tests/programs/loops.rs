@@ -1,7 +1,7 @@
 //! Loops that are left or begun again from within, and threads: what they set for the text behind them.
 
 use crate::programs_support::Cell;
-use crate::programs_support::text::{krl_moves, krl_pose as krl, krl_text, script_pose, told};
+use crate::programs_support::text::{beside, krl_moves, krl_pose as krl, krl_text, script_pose, told};
 use robotcal::geom::Pose;
 use robotcal::programs::LeftReason;
 
@@ -101,5 +101,47 @@ fn the_tool_of_inverse_kinematics_is_the_one_that_it_names() {
     ] {
         let told = told(&cell, &[("a.script", text(short, &arguments))], &[]);
         assert_eq!(told, (0, vec![reason.name().to_owned()]), "{arguments}");
+    }
+}
+
+/// A thread goes on beside the text: it may set the tool behind every statement that takes time, and what runs it may do so beside the thread.
+#[test]
+fn what_a_thread_sets_may_hold_until_it_has_ended() {
+    let cell = Cell::ur(104);
+    let step = |k: usize| format!("  movel({})\n", script_pose(&cell.nominal.base_from_tip(&beside(k))));
+    let [first, second] = [step(1), step(2)];
+    let set = |z: f64| format!("  set_tcp(p[0,0,{z},0,0,0])\n");
+    let (own, other) = (set(0.1), set(0.2));
+    let thread = |body: &str| format!("  thread t():\n  sleep(3)\n{body}  end\n");
+    let sets = thread(&other);
+    let tool = LeftReason::ToolUnknown.name();
+    for (body, left) in [
+        (format!("{sets}  k=run t()\n{own}{first}{second}"), 1),
+        (format!("{sets}  k=run t()\n{own}  sleep(1)\n{first}{second}"), 2),
+        (format!("{sets}  k=run t()\n{own}  sync()\n{first}{own}{second}"), 1),
+        (format!("{sets}  k=run t()\n  join k\n{own}{first}{second}"), 0),
+        (format!("{sets}  k=run t()\n  kill k\n{own}{first}{second}"), 0),
+        (format!("{sets}  k=run t()\n  join l\n{own}{first}{second}"), 1),
+        (format!("{sets}  k=run t()\n  k=run t()\n  join k\n{own}{first}{second}"), 1),
+        (format!("{sets}  k=run t()\n  k=run u()\n  join k\n{own}{first}{second}"), 1),
+        (format!("{sets}  while a:\n  k=run t()\n  join k\n{own}{first}{second}  end\n"), 0),
+        (format!("{sets}  if a:\n  k=run t()\n  end\n{own}{first}{second}"), 1),
+        // What it sets for a while counts, too, and so does what it calls.
+        (format!("{}  k=run t()\n{own}{first}{second}", thread(&format!("{other}  sleep(1)\n{own}"))), 1),
+        (format!("  def s():\n{other}  end\n{}  k=run t()\n{own}{first}{second}", thread("  s()\n")), 1),
+        (format!("{}  k=run t()\n{own}{first}{second}", thread(&own)), 0),
+        (format!("{sets}  def go():\n{first}{second}  end\n  k=run t()\n{own}  go()\n"), 1),
+        (format!("{sets}  def s():\n{own}  end\n  k=run t()\n  s()\n{first}{second}"), 1),
+        // The thread has what is set beside it.
+        (format!("{}{own}  k=run t()\n  sleep(1)\n{other}", thread(&format!("{first}{second}"))), 2),
+        (format!("{}{own}  k=run t()\n  sleep(1)\n{other}", thread(&format!("{own}{first}{second}"))), 1),
+        (format!("{}{own}  k=run t()\n  sleep(1)\n{own}", thread(&format!("{first}{second}"))), 0),
+        (format!("{}{own}  k=run t()\n  join k\n{other}", thread(&format!("{first}{second}"))), 0),
+    ] {
+        let start = beside(0);
+        let text = format!("def p():\n{own}  movej({start:?})\n{body}end\n");
+        let near: Vec<String> = start.iter().map(|q| q.to_degrees().to_string()).collect();
+        let near = format!("--start={}", near.join(","));
+        assert_eq!(told(&cell, &[("a.script", text)], &[&near]), (3 - left, vec![tool.to_owned(); left]), "{body}");
     }
 }

@@ -1,5 +1,7 @@
 //! What statements of a script set for the moves behind them.
 
+use std::collections::BTreeMap;
+
 use crate::geom::Pose;
 use crate::programs::flow::{Followed, Held};
 use crate::programs::program::{StatedFrame, Understood};
@@ -17,6 +19,23 @@ const SWITCHES: [(&[u8], usize, bool); 5] = [
     (b"path_offset_enable", PATH_OFFSET, true),
     (b"path_offset_disable", PATH_OFFSET, false),
 ];
+
+/// Why something is not known.
+const BESIDE: &str = "one that runs beside it may set it at any time";
+
+/// Threads that run on one way or another.
+fn running_either(
+    one: &BTreeMap<String, Option<String>>,
+    other: &BTreeMap<String, Option<String>>,
+) -> BTreeMap<String, Option<String>> {
+    let mut all = one.clone();
+    for (name, held) in other {
+        all.entry(name.clone())
+            .and_modify(|own| *own = own.take().filter(|own| Some(own) == held.as_ref()))
+            .or_insert_with(|| held.clone());
+    }
+    all
+}
 
 /// The tool, and why it is not known.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +64,11 @@ impl ToolIs {
         Err(Why::new(LeftReason::ToolUnknown, format!("its tool is not known: {words}")))
     }
 
+    /// One of two.
+    fn one_of_two(why: &str) -> Self {
+        Self::Several(format!("set_tcp sets several on the ways to it, or none on some ({why})"))
+    }
+
     /// That of a move to joints.
     pub fn beside_joints(&self) -> StatedFrame {
         match self {
@@ -62,12 +86,25 @@ pub(super) struct Active {
     pub tool: Held<ToolIs>,
     /// True for what may move the tool on top of the targets.
     on_top: [Held<bool>; ON_TOP],
+    /// What goes on beside the text and may set these: threads, with the variable that holds one where it is run once.
+    pub beside: Held<BTreeMap<String, Option<String>>>,
 }
 
 impl Active {
     /// Where nothing has set anything yet.
     pub fn new(tool: Option<Pose>) -> Self {
-        Self { tool: Held::new(tool.map_or(ToolIs::Unset, ToolIs::Known)), on_top: [false; ON_TOP].map(Held::new) }
+        Self {
+            tool: Held::new(tool.map_or(ToolIs::Unset, ToolIs::Known)),
+            on_top: [false; ON_TOP].map(Held::new),
+            beside: Held::new(BTreeMap::new()),
+        }
+    }
+
+    /// What goes on beside the text, and ends so, may have set meanwhile.
+    pub fn or_set_by(&mut self, end: &Self) {
+        self.tool.or_passed_by(&end.tool, |_, _| ToolIs::one_of_two(BESIDE));
+        let on_top = self.on_top.iter_mut().zip(&end.on_top);
+        on_top.for_each(|(own, end)| own.or_passed_by(end, |_, _| true));
     }
 
     /// A call that begins or ends a motion on top of that of the targets; false for any other.
@@ -86,17 +123,23 @@ impl Active {
 impl Followed for Active {
     fn merged(&self, other: &Self, why: &str) -> Self {
         let on_top = [CONVEYOR, PATH_OFFSET].map(|k| self.on_top[k].merged(&other.on_top[k], |_, _| true));
-        let words = || format!("set_tcp sets several on the ways to it, or none on some ({why})");
-        let several = |_: &ToolIs, _: &ToolIs| ToolIs::Several(words());
-        Self { tool: self.tool.merged(&other.tool, several), on_top }
+        Self {
+            tool: self.tool.merged(&other.tool, |_, _| ToolIs::one_of_two(why)),
+            on_top,
+            beside: self.beside.merged(&other.beside, running_either),
+        }
     }
 
     fn at_top(&self) -> Self {
-        Self { tool: self.tool.at_top(), on_top: self.on_top.each_ref().map(Held::at_top) }
+        Self {
+            tool: self.tool.at_top(),
+            on_top: self.on_top.each_ref().map(Held::at_top),
+            beside: self.beside.at_top(),
+        }
     }
 
     fn behind_call(&self, end: &Self) -> Self {
         let on_top = [CONVEYOR, PATH_OFFSET].map(|k| self.on_top[k].behind_call(&end.on_top[k]));
-        Self { tool: self.tool.behind_call(&end.tool), on_top }
+        Self { tool: self.tool.behind_call(&end.tool), on_top, beside: self.beside.behind_call(&end.beside) }
     }
 }

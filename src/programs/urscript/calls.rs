@@ -144,11 +144,17 @@ impl Script<'_> {
     /// A call that is no known move; the reader stands on its name.
     pub(super) fn other_call(&mut self) {
         let Some((name, close)) = call(&self.reader) else { return };
-        self.call(name.clone());
+        match self.reader.ahead_is_word(-1, "run") {
+            true => self.runs(name.clone()),
+            false => self.way.call(name.clone(), self.flow, &mut self.now),
+        }
         match ELSEWHERE.iter().find(|(known, _)| *known == name) {
             Some((_, true)) => self.way.go_beyond(&mut self.now.1),
             Some((_, false)) => self.way.lose(&mut self.now.1),
             None => {}
+        }
+        if !READ.contains(&name.as_str()) && !self.flow.has_routine(&name) {
+            self.time_passes();
         }
         if self.is_unknown(&name) || self.handing_on.contains(&name) {
             let all: Vec<Given> = arguments(&self.reader, close).into_iter().filter_map(|at| self.given(at)).collect();

@@ -5,12 +5,13 @@ mod active;
 mod arguments;
 mod calls;
 mod routines;
+mod threads;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::ProgramSetting;
 use super::field::{Field, FieldPlace};
-use super::flow::{Branching, Flow, Followed, Places, settled};
+use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::program::{
     JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, StatedFrame, Target, TargetKind, Understood,
@@ -206,7 +207,10 @@ impl Script<'_> {
                 // Behind the name of a routine, too: there it is not called.
                 self.reader.at = at + 1 + usize::from(matches!(word, b"def" | b"thread"));
             } else if self.now.0.switched(word) {
+                self.set_for_threads();
                 self.reader.at = at + 1;
+            } else if self.ends_thread(word, next) {
+                self.reader.at = at + 2;
             } else if word == b"set_tcp" && next == Some(TokenKind::Mark(b'(')) {
                 self.reader.at += 2;
                 let value = self.argument()?;
@@ -214,6 +218,7 @@ impl Script<'_> {
                     Value::Pose(fields, _) => ToolIs::Known(pose_of(fields)),
                     _ => self.setting.tool.map_or(ToolIs::Computed, ToolIs::Known),
                 });
+                self.set_for_threads();
             } else if next == Some(TokenKind::Mark(b'='))
                 && self.reader.ahead(2).map(|t| t.kind) != Some(TokenKind::Mark(b'='))
             {
@@ -231,15 +236,6 @@ impl Script<'_> {
         Ok(())
     }
 
-    /// A call of a routine, or of a thread, which goes on beside the text.
-    fn call(&mut self, name: String) {
-        let before = self.now.clone();
-        self.way.call(name, self.flow, &mut self.now);
-        if self.reader.ahead_is_word(-1, "run") {
-            self.now = self.now.merged(&before, "a thread sets it");
-        }
-    }
-
     /// Follows statements that end with `end`; false for any other word.
     fn block(&mut self, word: &[u8], next: Option<TokenKind>) -> bool {
         let assigned = next == Some(TokenKind::Mark(b'='));
@@ -254,6 +250,9 @@ impl Script<'_> {
                     .ahead(1)
                     .map_or_else(String::new, |t| String::from_utf8_lossy(self.reader.text(t)).into_owned());
                 self.flow.routine_begins(name, &mut self.now, &(Active::new(self.setting.tool), Stands::default()));
+                if word == b"thread" {
+                    self.time_passes();
+                }
             }
             _ if begins => {
                 self.way.branches_begin();
@@ -338,6 +337,7 @@ impl Script<'_> {
             }
         }
         self.reader.at = close + 1;
+        self.time_passes();
         Ok(())
     }
 
