@@ -39,6 +39,27 @@ fn what_a_handler_sets_may_hold_behind_every_motion_and_what_is_stated_again_hol
     }
 }
 
+/// `RESUME` goes on behind the routine that was called where the interrupt was declared.
+#[test]
+fn what_a_routine_sets_for_a_while_may_hold_where_an_interrupt_leaves_it() {
+    let cell = Cell::kuka(144);
+    let pose = krl(&cell, &beside(0));
+    let tool = LeftReason::ToolUnknown.name();
+    let (none, handler) = ("$TOOL=$NULLFRAME", "END\nDEF h()\nBRAKE\nRESUME");
+    let search = format!("END\nDEF search()\nSET\nMOVE\n{none}\nMOVE");
+    for (body, corrected, left) in [
+        (format!("{INTERRUPT}search()\nMOVE\n{search}\n{handler}"), 2, vec![tool]),
+        (format!("{INTERRUPT}search()\n{none}\nMOVE\n{search}\n{handler}"), 3, vec![]),
+        (format!("{INTERRUPT}first()\nMOVE\nEND\nDEF first()\nsearch()\n{search}\n{handler}"), 2, vec![tool]),
+        (format!("{INTERRUPT}search()\nMOVE\n{search}\nEND\nDEF h()\nBRAKE"), 3, vec![]),
+        (format!("search()\nMOVE\n{search}\n{handler}"), 3, vec![]),
+        (format!("{INTERRUPT}search()\nMOVE\nEND\nDEF search()\nMOVE\n{handler}"), 2, vec![]),
+    ] {
+        let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
+        assert_eq!(told(&cell, &[("a.src", krl_text(&pose, &body))], &[]), (corrected, left), "{body}");
+    }
+}
+
 #[test]
 fn a_handler_begins_with_unknown_frames_and_the_main_program_keeps_its_own() {
     let cell = Cell::kuka(142);

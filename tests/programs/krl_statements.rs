@@ -265,3 +265,43 @@ fn targets_that_a_sensor_corrects_are_left() {
         ],
     );
 }
+
+/// The frame of zeros has no numbers; what is seen from it is what it is.
+#[test]
+fn a_position_seen_from_the_null_frame_is_that_position() {
+    use LeftReason::{Computed, FramesDiffer, PostureUnknown, Undeclared};
+    let cell = Cell::kuka(341);
+    assert_all_meet(&cell, "P1=@\nLIN $NULLFRAME:P1\n", "P1=");
+    assert_all_meet(&cell, "$BASE=$NULLFRAME:$NULLFRAME\nLIN $NULLFRAME:@\nLIN $nullframe : @\n", "LIN");
+    check(
+        &cell,
+        &[
+            ("P1=@\nLIN P1:$NULLFRAME\n", 0, &[Computed]),
+            ("P1=@\nLIN $NULLFRAME:P1:P2\n", 0, &[Computed]),
+            ("P1=@\nP2=$NULLFRAME:P1\n$BASE=P2\n$BASE=$NULLFRAME\nLIN P1\n", 0, &[FramesDiffer]),
+            ("PTP $NULLFRAME\nLIN @\n", 0, &[Undeclared, PostureUnknown]),
+        ],
+    );
+}
+
+#[test]
+fn what_triggers_and_interrupts_set_for_paths_may_hold_behind_them() {
+    use LeftReason::{FrameUnknown, OrientationKept, ToolUnknown};
+    let cell = Cell::kuka(342);
+    check(
+        &cell,
+        &[
+            ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO $TOOL={X 0,Y 0,Z 50,A 0,B 0,C 0}\nLIN @\n", 0, &[ToolUnknown]),
+            (
+                "TRIGGER WHEN PATH=20.0 DELAY=0 DO $BASE={FRAME: X 0,Y 0,Z 50,A 0,B 0,C 0} PRIO=-1\nLIN @\n",
+                0,
+                &[FrameUnknown],
+            ),
+            ("INTERRUPT DECL 3 WHEN $IN[1] DO $BASE.X=12\nLIN @\n", 0, &[FrameUnknown]),
+            ("TRIGGER WHEN DISTANCE=1 DELAY=0 DO $IPO_MODE=#TCP\nLIN @\n", 0, &[ToolUnknown]),
+            ("INTERRUPT DECL 3 WHEN $IN[1] DO $ORI_TYPE=#CONSTANT\nLIN @\nPTP @\n", 1, &[OrientationKept]),
+            ("LIN @\nTRIGGER WHEN DISTANCE=1 DELAY=0 DO $ORI_TYPE=#VAR\nLIN @\n", 2, &[]),
+            ("TRIGGER WHEN DISTANCE=1 DELAY=0 DO $IPO_MODE=#BASE\nLIN @\n", 1, &[]),
+        ],
+    );
+}

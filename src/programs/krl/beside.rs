@@ -2,27 +2,25 @@
 
 use super::assigned::assigned;
 use super::frames::{FrameIs, Frames};
-use super::{Module, Now};
+use super::{Module, Now, unset};
 use crate::programs::flow::{Followed, Held};
 use crate::programs::scan::Reader;
 
-/// Frames that such a statement sets itself (`DO $BASE=..`), without a routine.
-const FRAMES: [&str; 2] = ["$TOOL", "$BASE"];
+/// What such a statement sets itself (`DO $BASE=..`), without a routine.
+const SET: [&str; 4] = ["$TOOL", "$BASE", "$IPO_MODE", "$ORI_TYPE"];
 /// Statements during which time passes, beside motions and calls.
 const WAITS: [&str; 2] = ["WAIT", "HALT"];
 /// Why something is not known.
 const ANY_TIME: &str = "an interrupt or a trigger may set it at any time";
+const LEFT_ANYWHERE: &str = "an interrupt may have left the routine that sets it at any of its statements (RESUME)";
 const RUN_AT_ANY_TIME: &str = "an interrupt or a trigger runs the routine at any time";
 
-/// The frame that such a line sets itself.
-fn frame_set(reader: &mut Reader<'_>) -> Option<String> {
-    let start = reader.at;
+/// What such a line sets itself; the reader ends before the value.
+fn is_set(reader: &mut Reader<'_>) -> Option<String> {
     while !reader.at_line_end() && !reader.ahead_is_word(-1, "DO") {
         reader.at += 1;
     }
-    let set = assigned(reader).map(|(name, _)| name);
-    reader.at = start;
-    set.filter(|name| FRAMES.contains(&name.as_str()))
+    assigned(reader).map(|(name, _)| name).filter(|name| SET.contains(&name.as_str()))
 }
 
 fn at_some_time(frame: &mut Held<FrameIs>) {
@@ -48,9 +46,29 @@ impl Module<'_> {
         (active, stands)
     }
 
-    /// A statement that sets a frame at any time.
+    /// Behind a call of a routine: an interrupt may have left it at any of its statements (`RESUME`).
+    pub(super) fn may_have_been_left(&mut self, routine: &str) {
+        let is_beside = self.now.0.beside.value.iter().any(|name| !SET.contains(&name.as_str()));
+        if !self.resumes || !is_beside {
+            return;
+        }
+        if let Some((end, _)) = self.flow.behind(routine, &unset()) {
+            self.now.0.or_left_by(&end, LEFT_ANYWHERE);
+        }
+        self.way.go_beyond(&mut self.now.1);
+    }
+
+    /// A statement that sets a frame, or how it counts, at any time.
     pub(super) fn sets_beside(&mut self, reader: &mut Reader<'_>) {
-        frame_set(reader).into_iter().for_each(|name| self.goes_on_beside(name));
+        let start = reader.at;
+        let name = is_set(reader);
+        let matters = match name.as_deref() {
+            Some("$IPO_MODE") => self.is_tool_in_room(reader),
+            Some("$ORI_TYPE") => self.keeps_orientation(reader),
+            _ => true,
+        };
+        reader.at = start;
+        name.filter(|_| matters).into_iter().for_each(|name| self.goes_on_beside(name));
     }
 
     fn goes_on_beside(&mut self, name: String) {
@@ -69,6 +87,8 @@ impl Module<'_> {
             match name.as_str() {
                 "$TOOL" => at_some_time(&mut self.now.0.tool),
                 "$BASE" => at_some_time(&mut self.now.0.base),
+                "$IPO_MODE" => self.now.0.tool_in_room.set(true),
+                "$ORI_TYPE" => self.now.0.keeps_orientation.set(true),
                 routine => {
                     // The event may come here.
                     let top = self.top_beside(std::slice::from_ref(&name));

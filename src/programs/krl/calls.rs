@@ -47,6 +47,17 @@ pub(super) fn routines_in(mut reader: Reader<'_>, all: &mut Routines) {
     }
 }
 
+/// True where a statement of a file leaves the routines that an interrupt has come upon.
+pub(super) fn resumes(mut reader: Reader<'_>) -> bool {
+    while !reader.done() {
+        if reader.ahead_is_word(0, "RESUME") {
+            return true;
+        }
+        reader.skip_line();
+    }
+    false
+}
+
 /// The name that an argument is, alone or with an index or components.
 fn name_of(reader: &mut Reader<'_>, part: Range<usize>) -> Option<String> {
     let start = std::mem::replace(&mut reader.at, part.start);

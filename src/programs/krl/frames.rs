@@ -176,6 +176,17 @@ impl Active {
         }
     }
 
+    /// The same where a routine that ends so may have been left at any statement.
+    pub fn or_left_by(&mut self, end: &Self, why: &str) {
+        let either = |one: &FrameIs, other: &FrameIs| one.either(other, why);
+        self.tool.or_passed_by(&end.tool, either);
+        self.base.or_passed_by(&end.base, either);
+        self.tool_in_room.or_passed_by(&end.tool_in_room, |_, _| true);
+        self.keeps_orientation.or_passed_by(&end.keeps_orientation, |_, _| true);
+        self.is_sensed.or_passed_by(&end.is_sensed, |_, _| true);
+        self.beside.or_passed_by(&end.beside, |one, other| one | other);
+    }
+
     /// All frames.
     pub fn set(&mut self, frames: Frames) {
         self.tool.set(frames.tool);

@@ -25,7 +25,7 @@ use assigned::{Assigned, assigned};
 use calls::{is_beside, routine_name};
 use frames::{Active, FrameIs, Frames, OwnFrames};
 use given::Given;
-use moves::{MOVES, RELATIVE, begins_spline};
+use moves::{MOVES, RELATIVE, begins_spline, is_seen_from_null};
 use scopes::Scopes;
 use uses::Uses;
 
@@ -111,6 +111,7 @@ fn reading(
         motion_data: None,
         path_data: None,
         spline: None,
+        resumes: false,
         copies: BTreeMap::new(),
         given: Vec::new(),
         way: Itinerary::new(),
@@ -120,6 +121,7 @@ fn reading(
         module.assigned.look_through(reader(index, file)?, !has_moves(file));
         if has_moves(file) {
             module.uses.look_through(reader(index, file)?);
+            module.resumes |= calls::resumes(reader(index, file)?);
             calls::look_through(&mut references, reader(index, file)?);
         }
     }
@@ -164,6 +166,8 @@ struct Module<'a> {
     path_data: Option<bool>,
     /// Frames of the spline block that is open.
     spline: Option<OwnFrames>,
+    /// True where an interrupt may leave the routines that it has come upon.
+    resumes: bool,
     /// Names that the routine has copied before any statement of the text above gave them a value, with their copies.
     copies: BTreeMap<String, Vec<String>>,
     /// Variables that routines in none of the files are given.
@@ -263,6 +267,9 @@ impl Module<'_> {
 
     /// An aggregate, a name, or anything else; the reader ends behind it or somewhere before the end of the line.
     fn value(&self, reader: &mut Reader<'_>) -> Result<Value> {
+        if is_seen_from_null(reader) {
+            reader.at += 2;
+        }
         let value = if reader.is_mark(b'{') {
             Value::Aggregate(Aggregate::read(reader)?)
         } else if let Some(word) = reader.name() {

@@ -3,6 +3,7 @@
 use super::aggregate::Aggregate;
 use super::assigned::matching;
 use super::frames::Frames;
+use super::moves::NULL_FRAME;
 use super::{Module, POSE_NAMES, Value};
 use crate::error::{Code, Error, Result};
 use crate::programs::program::{MeantPosture, Target, TargetKind, Understood};
@@ -108,7 +109,10 @@ impl Module<'_> {
         if STANDS.iter().any(|stands| name.starts_with(stands)) {
             return;
         }
-        let words = format!("{name} is a variable of the controller: what it holds, the text does not tell");
+        let words = match name {
+            NULL_FRAME => format!("{name} stands for zeros, and has no numbers in the text"),
+            _ => format!("{name} is a variable of the controller: what it holds, the text does not tell"),
+        };
         self.leave_at(motion.place.0, motion.place.1, motion.name, Why::of(name, LeftReason::Undeclared, words));
         self.way.lose(&mut self.now.1);
     }

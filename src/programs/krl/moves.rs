@@ -8,6 +8,14 @@ pub(super) const MOVES: [(&str, usize); 7] =
 pub(super) const RELATIVE: [&str; 7] =
     ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL", "SPL_REL"];
 
+/// The frame without any displacement.
+pub(super) const NULL_FRAME: &str = "$NULLFRAME";
+
+/// True before `$NULLFRAME:`, behind which stands a position as it is.
+pub(super) fn is_seen_from_null(reader: &Reader<'_>) -> bool {
+    reader.ahead_is_word(0, NULL_FRAME) && reader.ahead_is_mark(1, b':')
+}
+
 /// True for the header of a spline block: `SPLINE`, `PTP_SPLINE`, `PTP SPLINE`.
 pub(super) fn begins_spline(reader: &Reader<'_>) -> bool {
     let is = |word| reader.ahead_is_word(0, word);

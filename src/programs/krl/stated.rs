@@ -2,6 +2,7 @@
 
 use super::aggregate::{Aggregate, index};
 use super::frames::{FrameIs, Frames, OwnFrames};
+use super::moves::NULL_FRAME;
 use super::{Module, Value};
 use crate::geom::Pose;
 use crate::programs::reason::LeftReason;
@@ -10,7 +11,7 @@ use crate::programs::scan::Reader;
 impl Module<'_> {
     pub(super) fn frame(&self, value: &Value) -> FrameIs {
         if let Value::Name(name) = value
-            && name == "$NULLFRAME"
+            && name == NULL_FRAME
         {
             return FrameIs::Known(Pose::identity());
         }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::aggregate::index;
 use super::assigned::assigned;
-use super::moves::{MOVES, begins_spline};
+use super::moves::{MOVES, begins_spline, is_seen_from_null};
 use crate::programs::scan::{Reader, TokenKind};
 
 /// Variables of the controller that hold frames.
@@ -27,7 +27,9 @@ pub(super) struct Uses {
 fn names(reader: &mut Reader<'_>, ends: impl Fn(&Reader<'_>) -> bool) -> Vec<String> {
     let mut all = Vec::new();
     while !reader.at_line_end() && !ends(reader) {
-        let is_other = [b'.', b'#'].iter().any(|mark| reader.ahead_is_mark(-1, *mark)) || reader.ahead_is_mark(1, b'(');
+        let is_other = [b'.', b'#'].iter().any(|mark| reader.ahead_is_mark(-1, *mark))
+            || reader.ahead_is_mark(1, b'(')
+            || is_seen_from_null(reader);
         let name = reader.name().filter(|_| !is_other);
         reader.at += 1;
         if let Some(name) = name {
