@@ -344,3 +344,16 @@ fn a_jointtarget_of_external_axes_alone_is_none_of_the_arm() {
     assert_told(&cell, &declared, 1, &[]);
     assert_told(&cell, &format!("MoveAbsJ {external},v1,z1,tGun;\n{step}"), 1, &[LeftReason::NotATarget.name()]);
 }
+
+/// Such a program was refused as a whole.
+#[test]
+fn a_target_made_of_parts_of_others_is_computed() {
+    let cell = Cell::kuka(352);
+    let computed = LeftReason::Computed.name();
+    let go = |target: &str| format!("MoveJ p1,v1,z1,tGun\\WObj:=wTable;\nMoveL {target},v1,z1,tGun\\WObj:=wTable;");
+    for target in ["[p1.trans,p1.rot,p1.robconf,p1.extax]", "[[300,0,400],p1.rot,p1.robconf,p1.extax]"] {
+        assert_told(&cell, &go(target), 1, &[computed]);
+    }
+    let none = "9E9,9E9,9E9,9E9,9E9,9E9";
+    assert_told(&cell, &format!("MoveAbsJ #,v1,z1,tGun;\nMoveAbsJ [jHere.robax,[{none}]],v1,z1,tGun;"), 1, &[computed]);
+}

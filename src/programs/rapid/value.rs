@@ -200,6 +200,10 @@ pub(super) fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result
         _ => return Ok(()),
     };
     let Node::List(parts) = value else { return Ok(()) };
+    // `[p.trans, p.rot, ..]` is computed.
+    if parts.len() == shape.len() && parts.iter().any(|part| !matches!(part, Node::List(_))) {
+        return Ok(());
+    }
     let count = |n: &Node| if let Node::List(l) = n { l.len() } else { 0 };
     let found: Vec<usize> = parts.iter().map(count).collect();
     if found != shape {
