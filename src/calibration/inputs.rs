@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::cell::{CellFiles, Ends};
 use super::pictures::Pictures;
+use crate::assess::Limits;
 use crate::error::{Code, Error, Notice, Result};
 use crate::identify::measure;
 use crate::output::{recover, restore, solution_json::SolutionRecord};
@@ -107,11 +108,11 @@ impl Inputs {
         Ok(Self { series, ..self })
     }
 
-    /// Looks at all images.
+    /// Looks at all images, with the limits of the solve.
     ///
     /// # Errors
     /// Series whose images show no plate; files that change meanwhile.
-    pub fn observe(self, watch: Watch) -> Result<Observed> {
+    pub fn observe(self, limits: &Limits, watch: Watch) -> Result<Observed> {
         let Self { description, chain, series: all, tip_notice, mut files, pictures: _until_the_end } = self;
         let mut notices = description.notices.clone();
         notices.extend(tip_notice);
@@ -127,7 +128,7 @@ impl Inputs {
                 notices.extend(s.notices.iter().cloned());
             }
             for view in s.views() {
-                let measured = measure(view, &chain, several, |_| watch(&view.name, view.stops.stops.len()))?;
+                let measured = measure(view, &chain, several, limits, |_| watch(&view.name, view.stops.stops.len()))?;
                 // What the readings give reason to say is the same for every camera.
                 let known: Vec<Notice> = measured.notices.into_iter().filter(|n| !notices.contains(n)).collect();
                 notices.extend(known);

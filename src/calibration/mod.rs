@@ -41,7 +41,7 @@ pub fn calibrate<S: Into<PathBuf>>(
 ) -> Result<Calibration> {
     let folders: Vec<PathBuf> = series.into_iter().map(Into::into).collect();
     let inputs = Inputs::read(urdf.as_ref(), &folders, Ends::default())?;
-    let observed = inputs.with_recordings(&RecordingOptions::default())?.observe(&|_, _| ())?;
+    let observed = inputs.with_recordings(&RecordingOptions::default())?.observe(&options.limits, &|_, _| ())?;
     Calibration::of(observed, options)
 }
 

@@ -74,8 +74,8 @@ fn series(args: &CompareArgs) -> Result<Verdict> {
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
     let inputs = Inputs::read(&args.urdf, &args.series, ends)?.with_recordings(&args.recording.options(&[])?)?;
     let truth = truth_of(&inputs.series)?;
-    let Observed { chain, series: measured, .. } = inputs.observe(&progress::of_series())?;
     let options = Options { model: args.robot_model.into(), ..Options::default() };
+    let Observed { chain, series: measured, .. } = inputs.observe(&options.limits, &progress::of_series())?;
     let solution = crate::identify::identify(chain, &measured, &options)?;
     let bar = progress::bar(1, "folds");
     let comparison = crate::identify::compare(&solution, truth.as_ref(), |done, total| {

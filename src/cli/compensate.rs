@@ -183,7 +183,7 @@ pub(super) fn run(args: &CompensateArgs) -> Result<Verdict> {
     };
     let choice = Choice::read(args.frames.as_deref(), args.from_frames.as_deref(), &sides)?;
     let framed = choice.framed(&sides)?;
-    let frames = choice.measured(language, &setting);
+    let frames = choice.measured(&sides, language, &setting)?;
     let models = Models {
         controller: &controller,
         from: from.as_ref().unwrap_or(&controller),

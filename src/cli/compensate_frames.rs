@@ -113,10 +113,20 @@ impl Choice {
     }
 
     /// What takes the place of the program's own frames.
-    pub fn measured(&self, language: Language, setting: &ProgramSetting) -> Option<MeasuredFrames> {
-        let Self::Measured { to, from } = self else { return None };
-        let limits = Limits::default();
-        Some(MeasuredFrames {
+    ///
+    /// # Errors
+    /// As of [`Choice::framed`].
+    pub fn measured(
+        &self,
+        sides: &Sides,
+        language: Language,
+        setting: &ProgramSetting,
+    ) -> Result<Option<MeasuredFrames>> {
+        let Self::Measured { to, from } = self else { return Ok(None) };
+        // Those with which the frames were found.
+        let limits =
+            solution(&sides.to, Some(&to.robot.solution.path))?.map_or_else(|_| Limits::default(), |s| s.limits());
+        Ok(Some(MeasuredFrames {
             to: frames_of(to),
             from: from.as_ref().map(|f| frames_of(f)),
             base_within: to.work_is_base().then_some((limits.same_tool_m, limits.same_work_rad)),
@@ -128,7 +138,7 @@ impl Choice {
                 tool: (limits.same_tool_m, limits.same_tool_rad),
                 clearly_nearer: limits.frame_clearly_nearer,
             },
-        })
+        }))
     }
 
     /// What the program is corrected with, in words.

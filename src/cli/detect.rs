@@ -105,11 +105,12 @@ fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<L
     let hashes = series.image_hashes()?;
     let inputs = [series.inputs.as_slice(), &hashes].concat();
     let bar = progress::bar(series.stops.stops.len(), &series.name);
-    let SeenSeries { images, flat_field } = detect_stops(&series, |_| bar.inc(1))?;
+    let limits = Limits::default();
+    let SeenSeries { images, flat_field } = detect_stops(&series, &limits, |_| bar.inc(1))?;
     bar.finish_and_clear();
     require_unchanged(&hashes, &series.image_hashes()?)?;
     let mut notices = series.notices.clone();
-    notices.extend(flat_field.iter().flat_map(|f| flat_field_drift(&series, &f.facts, &Limits::default())));
+    notices.extend(flat_field.iter().flat_map(|f| flat_field_drift(&series, &f.facts, &limits)));
     Ok(Looked { plate: series.plate.clone(), images, notices, inputs, flat_field, series: Some(series) })
 }
 

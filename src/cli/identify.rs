@@ -140,7 +140,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<Verdict> {
                 say!("{}", long_table::of_stops(&dry_run(inputs.chain, &inputs.series, &options)?));
                 return Ok(Verdict::Good);
             }
-            inputs.observe(&progress::of_series())?
+            inputs.observe(&options.limits, &progress::of_series())?
         }
     };
     if at.is_none() {

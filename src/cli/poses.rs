@@ -71,11 +71,11 @@ pub(super) fn run(args: &PosesArgs) -> Result<Verdict> {
         }
     }
     let views: Vec<Series> = series.iter().flat_map(Series::views).cloned().map(without_joints).collect();
-    let (mut measured, seen) = observe(&views)?;
+    let limits = Limits::default();
+    let (mut measured, seen) = observe(&views, &limits)?;
     notices.extend(seen);
     series.iter().zip(&hashes).try_for_each(|(s, before)| require_unchanged(before, &s.image_hashes()?))?;
     notices.extend(args.cameras.apply(&mut measured)?);
-    let limits = Limits::default();
     let found = stand_alone(&measured, &limits)?;
     notices.extend(found.notices.iter().cloned());
     let command = super::command_line().join(" ");
@@ -108,11 +108,11 @@ fn without_joints(mut view: Series) -> Series {
     view
 }
 
-fn observe(series: &[Series]) -> Result<(Vec<MeasuredSeries>, Vec<Notice>)> {
+fn observe(series: &[Series], limits: &Limits) -> Result<(Vec<MeasuredSeries>, Vec<Notice>)> {
     let (mut all, mut notices) = (Vec::new(), Vec::new());
     let watch = progress::of_series();
     for s in series {
-        let found = measure(s, &Chain::empty(), series.len() > 1, |_| watch(&s.name, s.stops.stops.len()))?;
+        let found = measure(s, &Chain::empty(), series.len() > 1, limits, |_| watch(&s.name, s.stops.stops.len()))?;
         notices.extend(found.notices);
         all.push(found.series);
     }

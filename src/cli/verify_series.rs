@@ -32,45 +32,59 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let Some(file) = &args.nominal else {
         let inputs = judged_inputs.with_recordings(&options)?;
         require_readings(&inputs)?;
-        let Observed { chain, series, files, .. } = inputs.observe(&progress::of_series())?;
-        let robot = compensated(chain, args.compensation.as_deref())?;
-        let model = judged(&robot, &args.urdf, &series)?;
-        let model: Vec<&JudgedImage> = model.iter().collect();
-        say_line!("{}", line("model", &args.urdf, &model));
+        let model = Model::of(args, inputs.chain.clone())?;
+        let Observed { series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
+        let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
+        let images: Vec<&JudgedImage> = images.iter().collect();
+        say_line!("{}", line("model", &args.urdf, &images));
         let mut reasons = Reasons::default();
-        weigh(args, &mut reasons, Measured { robot: &robot, series: &series, files: &files, model: &model });
+        weigh(args, &mut reasons, &model, Measured { series: &series, files: &files, images: &images });
         return Ok(reasons.verdict());
     };
     // Poses of a controller are those of the model that is in it, whichever robot is judged by them.
     let nominal_inputs = read(file)?;
     require_same_joints(&judged_inputs.chain, &nominal_inputs.chain, &args.urdf, file)?;
+    let model = Model::of(args, judged_inputs.chain)?;
     let Observed { chain, series, files, .. } =
-        nominal_inputs.with_recordings(&options)?.observe(&progress::of_series())?;
-    let robot = compensated(judged_inputs.chain, args.compensation.as_deref())?;
-    let series = in_told_postures(&robot, &series);
-    let model = judged(&robot, &args.urdf, &series)?;
-    let nominal = judged(&Robot::nominal(chain), file, &series)?;
-    let (model, nominal) = of_both(&model, &nominal);
-    let mut reasons = compare(args, file, &model, &nominal)?;
-    weigh(args, &mut reasons, Measured { robot: &robot, series: &series, files: &files, model: &model });
+        nominal_inputs.with_recordings(&options)?.observe(&model.limits, &progress::of_series())?;
+    let series = in_told_postures(&model.robot, &series, &model.limits);
+    let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
+    let nominal = judged((&Robot::nominal(chain), file), &series, &model.limits)?;
+    let (images, nominal) = of_both(&images, &nominal);
+    let mut reasons = compare(args, (file, &model.limits), &images, &nominal)?;
+    weigh(args, &mut reasons, &model, Measured { series: &series, files: &files, images: &images });
     Ok(reasons.verdict())
 }
 
-/// What was measured of a model, and how it does.
+/// What is judged, with what its solution states and the limits with which that was found.
+struct Model {
+    robot: Robot,
+    stated: Option<Stated>,
+    limits: Limits,
+}
+
+impl Model {
+    fn of(args: &VerifyArgs, chain: Chain) -> Result<Self> {
+        let robot = compensated(chain, args.compensation.as_deref())?;
+        let stated = Stated::beside(&args.urdf, &robot);
+        Ok(Self { limits: Stated::limits_of(stated.as_ref()), stated, robot })
+    }
+}
+
+/// What was measured, and how the model does there.
 struct Measured<'a> {
-    robot: &'a Robot,
     series: &'a [MeasuredSeries],
     files: &'a [InputFile],
-    model: &'a [&'a JudgedImage],
+    images: &'a [&'a JudgedImage],
 }
 
 /// The model beside what its solution states, and what the series shows of itself where it misses more.
-fn weigh(args: &VerifyArgs, reasons: &mut Reasons, measured: Measured<'_>) {
-    let Measured { robot, series, files, model } = measured;
-    let (urdf, limits) = (&args.urdf, &Limits::default());
-    let stated = Stated::beside(urdf, robot);
+fn weigh(args: &VerifyArgs, reasons: &mut Reasons, model: &Model, measured: Measured<'_>) {
+    let Measured { series, files, images } = measured;
+    let Model { robot, stated, limits } = model;
+    let urdf = &args.urdf;
     let expected = stated.as_ref().and_then(|s| Some((s, s.at_stops(series)?)));
-    let rms_m = 1e-3 * root_mean_square(&units(model));
+    let rms_m = 1e-3 * root_mean_square(&units(images));
     reasons.add_error((urdf, rms_m), expected, args.nominal.is_some(), limits);
     if let Some(stated) = stated.as_ref().filter(|s| s.was_fitted_to(files)) {
         reasons.add_own(urdf, stated);
@@ -79,14 +93,14 @@ fn weigh(args: &VerifyArgs, reasons: &mut Reasons, measured: Measured<'_>) {
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     let is_unexplained = expected.is_none() && rms_m > 1e-3 * limits.flange_sigma_mm;
     if reasons.misses() || is_unexplained {
-        reasons.findings.extend(shown_by_series(robot.chain.clone(), series));
+        reasons.findings.extend(shown_by_series(robot.chain.clone(), series, limits));
     }
 }
 
 /// What the series shows of itself with the origins of the model held: a plate or a camera that was moved, a zero that is off.
-fn shown_by_series(chain: Chain, series: &[MeasuredSeries]) -> Vec<FileFinding> {
+fn shown_by_series(chain: Chain, series: &[MeasuredSeries], limits: &Limits) -> Vec<FileFinding> {
     let selection = Selection { fix: vec![ROBOT.to_owned()], ..Selection::default() };
-    let options = Options { model: RobotModel::Rigid, selection, ..Options::default() };
+    let options = Options { model: RobotModel::Rigid, selection, limits: *limits, ..Options::default() };
     let found = identify(chain, series, &options);
     found.map_or_else(|_| Vec::new(), |solution| solution.findings.iter().filter_map(of_series).collect())
 }
@@ -121,7 +135,12 @@ fn require_same_joints(model: &Chain, nominal: &Chain, urdf: &Path, file: &Path)
     Err(Error::new(Code::JointUnknown, urdf.display(), what, remedy))
 }
 
-fn compare(args: &VerifyArgs, file: &Path, model: &[&JudgedImage], nominal: &[&JudgedImage]) -> Result<Reasons> {
+fn compare(
+    args: &VerifyArgs,
+    (file, limits): (&Path, &Limits),
+    model: &[&JudgedImage],
+    nominal: &[&JudgedImage],
+) -> Result<Reasons> {
     say_line!(
         "images    {} that both models predict; camera, hand-eye transform and plate fitted to the others",
         model.len()
@@ -139,13 +158,13 @@ fn compare(args: &VerifyArgs, file: &Path, model: &[&JudgedImage], nominal: &[&J
         )
     })?;
     let mut reasons = Reasons::default();
-    reasons.add_gain(ratio, "images", &Limits::default());
+    reasons.add_gain(ratio, "images", limits);
     Ok(reasons)
 }
 
-fn judged(robot: &Robot, file: &Path, series: &[MeasuredSeries]) -> Result<Vec<JudgedImage>> {
+fn judged((robot, file): (&Robot, &Path), series: &[MeasuredSeries], limits: &Limits) -> Result<Vec<JudgedImage>> {
     let bar = progress::bar(1, &file.display().to_string());
-    let found = verify_series(robot, series);
+    let found = verify_series(robot, series, limits);
     bar.finish_and_clear();
     found
 }

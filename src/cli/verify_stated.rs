@@ -6,7 +6,7 @@ use nalgebra::Vector6;
 
 use super::compensate_frames::{Side, solution};
 use super::show::read_solution;
-use crate::assess::{MeasuredPoint, NORMAL_95, PredictedFlange, fit_points, root_mean_square};
+use crate::assess::{Limits, MeasuredPoint, NORMAL_95, PredictedFlange, fit_points, root_mean_square};
 use crate::model::robot::{Posture, Robot};
 use crate::output::ALONE;
 use crate::output::restore::{FoundModel, found_model};
@@ -54,6 +54,11 @@ impl Stated {
         };
         let found = found_model(&record).ok()?;
         Some(Self { path, record, found, part: (!is_whole).then(|| robot.clone()) })
+    }
+
+    /// Those with which the solution was judged; where none stands beside a description, the usual ones.
+    pub fn limits_of(stated: Option<&Self>) -> Limits {
+        stated.map_or_else(Limits::default, |s| s.found.limits)
     }
 
     /// At the stops of series: markers as far from the flange as what stands still is.

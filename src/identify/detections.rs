@@ -24,7 +24,7 @@ pub struct SeenSeries {
 ///
 /// # Errors
 /// A series without images; dark and white images that are of no use.
-pub fn detect_stops(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<SeenSeries> {
+pub fn detect_stops(series: &Series, limits: &Limits, progress: impl Fn(&Path) + Sync) -> Result<SeenSeries> {
     let flat_field = flat_field(series)?;
     let picture = pictures(series, flat_field.as_ref());
     let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
@@ -38,7 +38,7 @@ pub fn detect_stops(series: &Series, progress: impl Fn(&Path) + Sync) -> Result<
         SeenImage::new(&stop.image, stop.path.as_deref(), image)
     });
     let mut seen: Vec<SeenImage> = seen.collect();
-    second_pass(series, &mut seen, picture);
+    second_pass(series, &mut seen, limits, picture);
     Ok(SeenSeries { images: seen, flat_field })
 }
 

@@ -34,7 +34,7 @@ struct Seen {
 }
 
 /// Reads joint values in the order of the chain and finds the plate in every image; `series` is what one camera saw. `several` series qualify the names
-/// that a single one leaves to its defaults. `progress` is called after every image, from any thread.
+/// that a single one leaves to its defaults; `limits` are those of the solve. `progress` is called after every image, from any thread.
 ///
 /// # Errors
 /// Of the readings (unit, missing joints), of a series none of whose images can be used, and of differently sized images.
@@ -42,6 +42,7 @@ pub fn measure(
     series: &Series,
     chain: &Chain,
     several: bool,
+    limits: &Limits,
     progress: impl Fn(&Path) + Sync,
 ) -> Result<MeasuredWithNotices> {
     if series.source == Source::NoImages {
@@ -55,7 +56,7 @@ pub fn measure(
     let lens = lens_of(series)?;
     let mut plate = series.plate.clone();
     let (mut seen, found_size) = match &series.source {
-        Source::Images { .. } => look_through(series, progress, &mut notices, &mut plate)?,
+        Source::Images { .. } => look_through(series, (limits, progress), &mut notices, &mut plate)?,
         Source::Observations(all) => {
             let by_name: BTreeMap<&str, &Vec<Observation>> =
                 all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
@@ -168,14 +169,14 @@ fn unused_repeatability(series: &Series) -> Option<Notice> {
 /// Looks at all images; sizes of dots that the plate does not state are those seen.
 fn look_through(
     series: &Series,
-    progress: impl Fn(&Path) + Sync,
+    (limits, progress): (&Limits, impl Fn(&Path) + Sync),
     notices: &mut Vec<Notice>,
     plate: &mut Plate,
 ) -> Result<SeenStops> {
-    let SeenSeries { images, flat_field } = detect_stops(series, progress)?;
+    let SeenSeries { images, flat_field } = detect_stops(series, limits, progress)?;
     set_radii(plate, images.iter().map(|image| &image.detection));
     notices.extend(images.iter().flat_map(SeenImage::notices));
-    notices.extend(flat_field.iter().flat_map(|f| flat_field_drift(series, &f.facts, &Limits::default())));
+    notices.extend(flat_field.iter().flat_map(|f| flat_field_drift(series, &f.facts, limits)));
     // The detector has refused all images of another size.
     let usable = images.iter().filter(|i| i.detection.failure.is_none());
     let size = usable.filter_map(|i| i.size).next().map(|(w, h)| (w as u32, h as u32));

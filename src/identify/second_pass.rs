@@ -30,12 +30,13 @@ const REACH: f64 = 2.5;
 pub(super) fn second_pass(
     series: &Series,
     images: &mut [SeenImage],
+    limits: &Limits,
     picture: impl Fn(&Path) -> Result<Picture> + Sync,
 ) {
     if !series.plate.kind.print().is_predicted {
         return;
     }
-    let Some((state, poses)) = first_solve(series, images) else { return };
+    let Some((state, poses)) = first_solve(series, images, limits) else { return };
     images.par_iter_mut().zip(poses).for_each(|(image, pose)| {
         let (Some(pose), Some(path)) = (pose, &image.path) else { return };
         let predicted = predict(&state, &series.plate, image, &pose);
@@ -46,7 +47,7 @@ pub(super) fn second_pass(
 }
 
 /// Cameras, plates and the stand-alone pose of every image, without a robot.
-fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Option<Pose>>)> {
+fn first_solve(series: &Series, images: &[SeenImage], limits: &Limits) -> Option<(State, Vec<Option<Pose>>)> {
     let seen = images.iter().filter(|i| i.detection.failure.is_none() && i.detection.circles.is_some());
     let sizes: Vec<(usize, usize)> = seen.filter_map(|i| i.size).collect();
     let (width, height) = *sizes.first().filter(|_| sizes.len() >= FEWEST_IMAGES)?;
@@ -64,14 +65,12 @@ fn first_solve(series: &Series, images: &[SeenImage]) -> Option<(State, Vec<Opti
     };
     let stops = images.iter().enumerate().map(stop).collect();
     let measured = measured_series(series, lens_of(series).ok()?, (width as u32, height as u32), true, stops);
-    // What is seen does not hang on what is decided of it later.
-    let limits = Limits::default();
     let nobody = Robot::nominal(Chain::empty());
-    let nothing = build(&nobody, &[measured], false, &limits).ok()?;
+    let nothing = build(&nobody, &[measured], false, limits).ok()?;
     let (_, free, _) = adjust_free_poses(
         nothing,
         &[series.manifest.camera().focal_px.map_or(CameraStart::Unknown, CameraStart::Focal)],
-        &limits,
+        limits,
     )
     .ok()?;
     let pose = |k: usize| free.poses[k].as_ref().map(|p| p.camera_from_plate);

@@ -28,8 +28,7 @@ pub struct JudgedImage {
 
 /// Series with readings that were computed from poses of a controller in the postures that the images tell with this robot: a better one tells
 /// them for a worse one, and that by which they were computed tells none. Ids of plates that look the same when they are turned are settled, too.
-pub fn in_told_postures(robot: &Robot, series: &[MeasuredSeries]) -> Vec<MeasuredSeries> {
-    let limits = &Limits::default();
+pub fn in_told_postures(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) -> Vec<MeasuredSeries> {
     let settled = turns::settled(robot, series, limits);
     let (told, _) = told_by_images(robot, (&settled, Before::Nearest), limits, with_robot_held);
     let mut told = told.into_owned();
@@ -51,9 +50,8 @@ fn with_robot_held(start: &mut Adjustment) -> Result<()> {
 ///
 /// # Errors
 /// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset.
-pub fn verify_series(robot: &Robot, series: &[MeasuredSeries]) -> Result<Vec<JudgedImage>> {
-    let limits = &Limits::default();
-    let series = in_told_postures(robot, series);
+pub fn verify_series(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) -> Result<Vec<JudgedImage>> {
+    let series = in_told_postures(robot, series, limits);
     let (mut adjustment, free, mut starts) = free_poses_of(robot, &series, limits, with_robot_held)?;
     start_robot(&mut adjustment, &free, StartGiven { series: &series, groups: &[], limits }, &mut starts)?;
     adjustment.tie_to_readings(false);

@@ -64,10 +64,11 @@ fn a_two_stage_result_is_written_shown_judged_and_solved_again_like_a_joint_one(
     std::fs::write(folder.path().join("points.csv"), table).unwrap();
     let mut corrected = std::fs::read_dir(folder.path().join("b")).unwrap().map(|e| e.unwrap().path());
     let corrected = corrected.find(|p| p.extension().is_some_and(|e| e == "urdf")).unwrap();
-    let judged = run(&[
+    let corrected = corrected.to_str().unwrap().to_owned();
+    let verify = [
         "verify",
         "--urdf",
-        corrected.to_str().unwrap(),
+        &corrected,
         "--compensation",
         "b/compensation.toml",
         "--nominal",
@@ -80,7 +81,8 @@ fn a_two_stage_result_is_written_shown_judged_and_solved_again_like_a_joint_one(
         "points.csv",
         "--joint-unit",
         "rad",
-    ]);
+    ];
+    let judged = run(&verify);
     assert!(
         judged.status.success(),
         "{}{}",
@@ -94,6 +96,12 @@ fn a_two_stage_result_is_written_shown_judged_and_solved_again_like_a_joint_one(
     // No joint noise can be stated for an estimator that has none.
     let refused = run(&["identify", "--from", "b/solution.json", "--joint-noise", "0.0001", "--out", "no"]);
     assert_eq!(refused.status.code(), Some(2));
+    // A model is judged with the limits of its solution.
+    let path = folder.path().join("b/solution.json");
+    let mut record: serde_json::Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    record["options"]["limits"]["scatter_images"] = 10_000.into();
+    std::fs::write(&path, serde_json::to_vec(&record).unwrap()).unwrap();
+    assert_eq!(run(&verify).status.code(), Some(1));
 }
 
 const NOISE_M: f64 = 5e-5;

@@ -347,7 +347,7 @@ fn ur10e() -> Robots {
     let folder = repo("datasets/ur10e_observations");
     let inputs =
         Inputs::read(&repo("robots/ur10e/ur10e.urdf"), std::slice::from_ref(&folder), Ends::default()).unwrap();
-    let observed = inputs.observe(&|_, _| {}).unwrap();
+    let observed = inputs.observe(&Limits::default(), &|_, _| {}).unwrap();
     let s = identify(observed.chain.clone(), &observed.series, &Options::default()).unwrap();
     let truth = Truth::read(&folder.join("truth.toml")).unwrap();
     let robot = truth.robot(&observed.chain).unwrap();

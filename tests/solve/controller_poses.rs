@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix6, Vector6};
+use robotcal::assess::Limits;
 use robotcal::calibration::{Calibration, Ends, Export, Inputs};
 use robotcal::diagnose::Finding;
 use robotcal::geom::{Pose, log_so3};
@@ -95,7 +96,7 @@ fn series(rotation: &str, columns: &str, poses: &[(String, Pose)], written: Writ
 
 fn calibrated(folder: &TempDir) -> Result<Calibration, Error> {
     let inputs = Inputs::without_robot(&[folder.path().to_path_buf()])?;
-    Calibration::of(inputs.observe(&|_, _| ())?, &Options::default())
+    Calibration::of(inputs.observe(&Limits::default(), &|_, _| ())?, &Options::default())
 }
 
 /// A squared normalised error with six degrees of freedom stays below this in 999 of 1000 cases.
@@ -375,7 +376,7 @@ fn the_images_tell_in_which_posture_a_pose_was_reached() {
     let nearest = right(nearest.iter().flatten().map(Vec::as_slice).collect());
     let inputs = Inputs::read(&urdf(), &[folder.path().to_path_buf()], Ends::default()).unwrap();
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
-    let calibration = Calibration::of(inputs.observe(&|_, _| ()).unwrap(), &options).unwrap();
+    let calibration = Calibration::of(inputs.observe(&options.limits, &|_, _| ()).unwrap(), &options).unwrap();
     let solution = calibration.solution();
     let told = right(solution.series[0].stops.iter().filter_map(|s| s.readings.as_deref()).collect());
     println!("nearest {nearest}, told {told} of {}", readings.len());
@@ -425,7 +426,7 @@ fn a_wrist_turned_over_at_all_stops_is_told_to_be_open() {
     let mut by_readings = solution.series.clone();
     by_readings[0].postures.clear();
     let robot = solution.exported_robot();
-    let judged = verify_series(&robot, &seen).unwrap();
-    assert_eq!(judged, verify_series(&robot, &by_readings).unwrap());
+    let judged = verify_series(&robot, &seen, &Limits::default()).unwrap();
+    assert_eq!(judged, verify_series(&robot, &by_readings, &Limits::default()).unwrap());
     assert!(judged.len() >= 20, "{}", judged.len());
 }

@@ -6,6 +6,7 @@ use nalgebra::Vector6;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use robotcal::assess::Limits;
 use robotcal::calibration::{Ends, Inputs};
 use robotcal::fit::Fit;
 use robotcal::geom::Pose;
@@ -122,7 +123,7 @@ fn seen(setting: &Setting, made: &SimulatedSeries, readings: Readings) -> Option
             write(folder.path(), made, Content::Observations).unwrap();
             with_poses(folder.path(), urdf, stated);
             let inputs = Inputs::read(urdf, &[folder.path().to_owned()], Ends::default()).unwrap();
-            inputs.observe(&|_, _| ()).unwrap().series.remove(0)
+            inputs.observe(&Limits::default(), &|_, _| ()).unwrap().series.remove(0)
         }
     };
     Some(MeasuredSeries { lens: *lens, lens_choice: LensChoice::Settled, ..seen })

@@ -74,7 +74,9 @@ fn study_of_series_on_the_tracker() {
         let chain = urdf.chain(series.manifest.base.as_deref(), series.manifest.tip.as_deref()).unwrap();
         let measured = |names: &[&str]| -> Vec<MeasuredSeries> {
             let one = |n: &&str| {
-                measure(&robotcal::series::read(&real.join(n)).unwrap(), &chain, true, |_| {}).unwrap().series
+                measure(&robotcal::series::read(&real.join(n)).unwrap(), &chain, true, &Limits::default(), |_| {})
+                    .unwrap()
+                    .series
             };
             names.iter().map(one).collect()
         };
@@ -127,7 +129,11 @@ fn confirms(real: &Path, names: &[&str], selections: &[&[usize]], tracker: &str)
     let points = tracker_points(&real.join(tracker));
     let nominal = fit_points(&Robot::nominal(chain.clone()), &points).unwrap().rms_m;
     let measured: Vec<MeasuredSeries> = (names.iter())
-        .map(|name| measure(&robotcal::series::read(&real.join(name)).unwrap(), &chain, true, |_| {}).unwrap().series)
+        .map(|name| {
+            measure(&robotcal::series::read(&real.join(name)).unwrap(), &chain, true, &Limits::default(), |_| {})
+                .unwrap()
+                .series
+        })
         .collect();
     for selection in selections {
         let chosen: Vec<MeasuredSeries> = selection.iter().map(|&k| measured[k].clone()).collect();
@@ -228,7 +234,7 @@ fn parts_of_the_noise_model_switched_off() {
         let series = robotcal::series::read(&real.join(name)).unwrap();
         let chain = urdf.chain(series.manifest.base.as_deref(), series.manifest.tip.as_deref()).unwrap();
         let points = tracker_points(&real.join(tracker));
-        let measured = measure(&series, &chain, false, |_| {}).unwrap().series;
+        let measured = measure(&series, &chain, false, &Limits::default(), |_| {}).unwrap().series;
         for lens in [Lens::Brown, Lens::ThinPrism] {
             let measured = [MeasuredSeries { lens, lens_choice: LensChoice::Settled, ..measured.clone() }];
             let solution = match identify(chain.clone(), &measured, &Options::default()) {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Matrix2, Vector2, Vector3};
+use robotcal::assess::Limits;
 use robotcal::model::circle::centroid_uv;
 use robotcal::series::{Edge, read_images};
 use robotcal::simulate::truth::Truth;
@@ -22,7 +23,9 @@ fn an_image_and_its_copy_show_the_same() {
     copied(&Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/kr6_small"), folder.path());
     let image = |k: u32| folder.path().join(format!("images/img_{k:03}.png"));
     std::fs::copy(image(4), image(5)).unwrap();
-    let seen = robotcal::identify::detect_stops(&read_images(folder.path()).unwrap(), |_| ()).unwrap().images;
+    let seen = robotcal::identify::detect_stops(&read_images(folder.path()).unwrap(), &Limits::default(), |_| ())
+        .unwrap()
+        .images;
     let rescued = seen[4].detection.circles.iter().flat_map(|c| &c.found).filter(|f| f.measured.visible < 0.97).count();
     assert!(rescued > 0, "the second pass found nothing");
     assert_eq!(seen[4].detection.observations, seen[5].detection.observations);
@@ -35,7 +38,7 @@ fn markers_across_the_border_are_found_and_their_covariance_is_true() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/kr6_small");
     let series = read_images(&folder).unwrap();
     let truth = Truth::read(&folder.join("truth.toml")).unwrap();
-    let seen = robotcal::identify::detect_stops(&series, |_| ()).unwrap().images;
+    let seen = robotcal::identify::detect_stops(&series, &Limits::default(), |_| ()).unwrap().images;
     let mut errors: Vec<(f64, f64)> = Vec::new();
     for (image, stop) in seen.iter().zip(&truth.stops) {
         assert_eq!(image.name, stop.image);
