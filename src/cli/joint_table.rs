@@ -5,8 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 
 use crate::error::{Code, Error, Result};
-use crate::files::{self, FileKind};
-use crate::series::{AngleUnit, check_unit};
+use crate::series::{AngleUnit, Table, check_unit};
 use crate::urdf::{Chain, JointKind};
 
 /// Unit of revolute joints in a file.
@@ -35,49 +34,18 @@ pub(super) fn read(
     chain: &Chain,
     (unit, flag): (Unit, &str),
 ) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
-    let bad = |code, line: u64, what: String, remedy: &str| {
-        Error::new(code, format!("{}:{line}", path.display()), what, remedy)
-    };
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(files::open(path, FileKind::Table)?.0);
-    let header = reader
-        .headers()
-        .map_err(|e| bad(Code::CsvSyntax, 1, e.to_string(), "the first line names the columns"))?
-        .clone();
-    let column = |name: &str| {
-        header.iter().position(|h| h == name).ok_or_else(|| {
-            let present: Vec<&str> = header.iter().collect();
-            let what = format!("no column '{name}' (present: {})", present.join(", "));
-            let named: Vec<&str> = first.iter().copied().chain(chain.readings.iter().map(String::as_str)).collect();
-            bad(Code::CsvColumnMissing, 1, what, &format!("name the columns {}", named.join(", ")))
-        })
-    };
-    let plain: Vec<usize> = first.iter().map(|name| column(name)).collect::<Result<_>>()?;
-    let joints: Vec<usize> = chain.readings.iter().map(|j| column(j)).collect::<Result<_>>()?;
-    let mut rows = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|e| {
-            Error::new(Code::CsvSyntax, path.display(), e, "every row has the columns of the first line")
-        })?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let number = |c: usize| {
-            let cell = record.get(c).unwrap_or("");
-            cell.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
-                bad(
-                    Code::CsvNumber,
-                    line,
-                    format!("'{cell}' in column {} is no number", &header[c]),
-                    "correct the cell",
-                )
-            })
-        };
-        let plain = plain.iter().map(|c| number(*c)).collect::<Result<_>>()?;
-        let readings: Vec<f64> = joints.iter().map(|c| number(*c)).collect::<Result<_>>()?;
-        rows.push((plain, readings));
-    }
+    let table = Table::read(path, &mut Vec::new())?;
+    let columns = |names: &[&str]| names.iter().map(|name| table.require(name)).collect::<Result<Vec<usize>>>();
+    let joints: Vec<&str> = chain.readings.iter().map(String::as_str).collect();
+    let (plain, joints) = (columns(first)?, columns(&joints)?);
+    let numbers = |row, columns: &[usize]| columns.iter().map(|c| table.number(row, *c)).collect::<Result<Vec<f64>>>();
+    let read = |row| -> Result<(Vec<f64>, Vec<f64>)> { Ok((numbers(row, &plain)?, numbers(row, &joints)?)) };
+    let mut rows: Vec<(Vec<f64>, Vec<f64>)> = table.rows().map(read).collect::<Result<_>>()?;
     if rows.is_empty() {
-        return Err(bad(Code::FileEmpty, 1, "no row of numbers".into(), "write one joint vector per row"));
+        let place = table.place_of_header();
+        return Err(Error::new(Code::FileEmpty, place, "no row of numbers", "write one joint vector per row"));
     }
-    let as_written: Vec<&[f64]> = rows.iter().map(|(_, readings): &(Vec<f64>, Vec<f64>)| readings.as_slice()).collect();
+    let as_written: Vec<&[f64]> = rows.iter().map(|(_, readings)| readings.as_slice()).collect();
     check_unit(path, unit.into(), chain, &as_written, |unit| format!("give {flag} {unit}"))?;
     if unit == Unit::Deg {
         let turning = |kind: &JointKind| *kind != JointKind::Prismatic;

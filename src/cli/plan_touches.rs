@@ -11,14 +11,14 @@ use super::plan_targets::targets;
 use super::pose_argument::pose;
 use super::say::{say, say_line};
 use super::show::read_solution;
+use crate::assess::Limits;
 use crate::error::{Code, Error, Result, plain_name};
-use crate::files::{self, FileKind};
 use crate::frames::{KnownRobot, PlannedTouch, TouchPlan, TouchRequest, plan_touches};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
 use crate::output::restore::found_model;
 use crate::output::{ResultFolder, plan_files};
-use crate::series::{AngleUnit, CameraMount, ContactSection, Manifest};
+use crate::series::{AngleUnit, CameraMount, ContactSection, Manifest, Row, Table};
 use crate::urdf::{Chain, JointKind};
 
 /// Flags of `plan` for touches.
@@ -70,7 +70,7 @@ pub(super) fn run(
     let chain = &robot.exported().chain;
     let wanted = target_file.map(|path| targets(path, chain)).transpose()?.unwrap_or_default();
     let request = TouchRequest {
-        points: read_points(points)?,
+        points: read_points(points, &found.limits)?,
         tool: pose("--touch-tool", &args.touch_tool)?.unwrap_or_else(Pose::identity),
         work: pose("--touch-work", &args.touch_work)?.unwrap_or_else(Pose::identity),
         count,
@@ -80,9 +80,10 @@ pub(super) fn run(
         tries: TRIES,
     };
     plain_name("frame", &args.touch_frame, "--touch-frame")?;
-    if count < robot_needs() {
+    let fewest = found.limits.fewest_touches;
+    if count < fewest {
         let what = format!("{count} touches");
-        return Err(Error::new(Code::OptionRange, "--count", what, format!("plan {} or more", robot_needs())));
+        return Err(Error::new(Code::OptionRange, "--count", what, format!("plan {fewest} or more")));
     }
     let TouchPlan { touches: planned, unreached } = plan_touches(&robot, &request, &found.limits)?;
     let files = [
@@ -92,7 +93,7 @@ pub(super) fn run(
     ];
     let files = files.map(|(name, text)| (name.to_owned(), text.into_bytes()));
     place.write_all(&plan_files::touch_files(files.into(), &super::command_line().join(" "))?)?;
-    say!("{}", text(&planned, &request, &robot, out));
+    say!("{}", text(&planned, (&request, fewest), &robot, out));
     if !unreached.is_empty() {
         let names: Vec<&str> = unreached.iter().map(|k| request.points[*k].0.as_str()).collect();
         say_line!(
@@ -103,47 +104,28 @@ pub(super) fn run(
     Ok(Verdict::Good)
 }
 
-fn robot_needs() -> usize {
-    crate::assess::Limits::default().fewest_touches
-}
-
 /// Points of a work object.
-fn read_points(path: &Path) -> Result<Vec<(String, Vector3<f64>)>> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(files::open(path, FileKind::Table)?.0);
-    let refuse = |code, line: u64, what: String, remedy: &str| {
-        Err(Error::new(code, format!("{}:{line}", path.display()), what, remedy))
-    };
-    let bad =
-        |e: csv::Error| Error::new(Code::CsvSyntax, path.display(), e, "every row has the columns of the first line");
-    let header = reader.headers().map_err(bad)?.clone();
-    let column = |name: &str| header.iter().position(|h| h == name);
-    let (Some(name), Some(x), Some(y), Some(z)) = (column("name"), column("x_m"), column("y_m"), column("z_m")) else {
-        let what = format!("columns are {}", header.iter().collect::<Vec<_>>().join(", "));
-        return refuse(Code::CsvColumnMissing, 1, what, "name them name,x_m,y_m,z_m");
-    };
-    let mut points = Vec::new();
-    for row in reader.records() {
-        let row = row.map_err(bad)?;
-        let line = row.position().map_or(0, csv::Position::line);
-        let number = |c: usize| row.get(c).and_then(|cell| cell.parse::<f64>().ok()).filter(|v| v.is_finite());
-        let (Some(x), Some(y), Some(z)) = (number(x), number(y), number(z)) else {
-            return refuse(Code::CsvNumber, line, "a coordinate is no number".into(), "give x_m, y_m, z_m in metres");
-        };
-        if [x, y, z].iter().any(|v| v.abs() > crate::assess::Limits::default().touches_apart_m) {
-            return refuse(Code::TouchUnit, line, format!("a point at ({x}, {y}, {z}) m"), "write metres, not mm");
+fn read_points(path: &Path, limits: &Limits) -> Result<Vec<(String, Vector3<f64>)>> {
+    let table = Table::read(path, &mut Vec::new())?;
+    let name = table.require("name")?;
+    let columns = [table.require("x_m")?, table.require("y_m")?, table.require("z_m")?];
+    let point = |row: Row<'_>| {
+        let [x, y, z] = columns.map(|c| table.number(row, c));
+        let at = Vector3::new(x?, y?, z?);
+        if at.amax() > limits.touches_apart_m {
+            let what = format!("a point at ({}, {}, {}) m", at.x, at.y, at.z);
+            return Err(Error::new(Code::TouchUnit, table.place(row), what, "write metres, not mm"));
         }
-        let name = row.get(name).unwrap_or_default();
-        points
-            .push((plain_name("point", name, format!("{}:{line}", path.display()))?.to_owned(), Vector3::new(x, y, z)));
-    }
+        Ok((row.cell(name).to_owned(), at))
+    };
+    let points = table.rows().map(point).collect::<Result<Vec<_>>>()?;
+    let refuse = |code, what: String, remedy: &str| Err(Error::new(code, table.place_of_header(), what, remedy));
     match points.len() {
-        0 => refuse(Code::FileEmpty, 1, "has no points".into(), "write one row a point"),
-        1 | 2 => refuse(
-            Code::TouchesFew,
-            1,
-            format!("has {} points", points.len()),
-            "a work object takes three or more that are not on a line",
-        ),
+        0 => refuse(Code::FileEmpty, "has no points".into(), "write one row a point"),
+        few if few < limits.fewest_places => {
+            let remedy = format!("a work object takes {} or more that are not on a line", limits.fewest_places);
+            refuse(Code::TouchesFew, format!("has {few} points"), &remedy)
+        }
         _ => Ok(points),
     }
 }
@@ -192,7 +174,7 @@ fn contacts(planned: &[PlannedTouch], request: &TouchRequest) -> String {
     "stop,contact,x_m,y_m,z_m\n".to_owned() + &planned.iter().enumerate().map(row).collect::<String>()
 }
 
-fn text(planned: &[PlannedTouch], request: &TouchRequest, robot: &KnownRobot, out: &Path) -> String {
+fn text(planned: &[PlannedTouch], (request, fewest): (&TouchRequest, usize), robot: &KnownRobot, out: &Path) -> String {
     let chain = &robot.exported().chain;
     let mut text = String::new();
     let of = if request.targets.is_empty() {
@@ -210,7 +192,7 @@ fn text(planned: &[PlannedTouch], request: &TouchRequest, robot: &KnownRobot, ou
     let _ = writeln!(text, "{:>10}  {:<12} {:>12}  joints, deg (m)", "stop", "point", "expected mm");
     for (k, t) in planned.iter().enumerate() {
         // Fewer do not determine tool and work object.
-        let expected = if k + 1 < robot_needs() { "-".to_owned() } else { format!("{:.3}", 1e3 * t.expected_m) };
+        let expected = if k + 1 < fewest { "-".to_owned() } else { format!("{:.3}", 1e3 * t.expected_m) };
         let joints = shown(&t.readings, chain).join(", ");
         let _ = writeln!(text, "{:>10}  {:<12} {expected:>12}  {joints}", stop(k), request.points[t.point].0);
     }

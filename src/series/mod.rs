@@ -72,7 +72,7 @@ pub use sections::{
 };
 pub use spatial::SpatialFiles;
 pub use spread::spread;
-pub(crate) use table::{csv_line, to_csv};
+pub(crate) use table::{Row, Table, csv_line, to_csv};
 pub use tag_plates::regions;
 pub use tags::{Region, TagPrint, Tags, dictionary_named};
 pub(crate) use toml_file::read_toml;

@@ -9,7 +9,7 @@ use crate::files::FileKind;
 
 /// One data row.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Row<'a> {
+pub(crate) struct Row<'a> {
     pub line: u64,
     first: usize,
     cells: &'a Cells,
@@ -43,7 +43,7 @@ impl Cells {
 
 /// A table whose rows all have as many cells as the header.
 #[derive(Debug)]
-pub(super) struct Table {
+pub(crate) struct Table {
     file: String,
     pub headers: Vec<String>,
     lines: Vec<u64>,

@@ -524,6 +524,10 @@ fn planned_touches_are_a_series_that_frames_reads() {
     // Points in mm, and points that no posture touches.
     std::fs::write(&points, "name,x_m,y_m,z_m\na,0,0,0\nb,100,0,0\nc,0,100,0\n").unwrap();
     assert_says(&robotcal(&plan, &out).expect(2).said(), Code::TouchUnit, &["fixture.csv:3"]);
+    std::fs::write(&points, "name;x_m;y_m;z_m\na;0;0;0\nb;1;0;0\nc;0;1;0\n").unwrap();
+    assert_says(&robotcal(&plan, &out).expect(2).said(), Code::CsvSeparator, &["fixture.csv:1"]);
+    std::fs::write(&points, "name,x_m,y_m,z_m,z_m\na,0,0,0,1\nb,1,0,0,1\nc,0,1,0,1\n").unwrap();
+    assert_says(&robotcal(&plan, &out).expect(2).said(), Code::CsvColumnTwice, &["fixture.csv:1"]);
     std::fs::write(&points, "name,x_m,y_m,z_m\na,0,0,0\nb,5,0,0\nc,0,5,0\n").unwrap();
     assert_says(&robotcal(&plan, &out).expect(3).said(), Code::PlanOutOfReach, &["b", "c"]);
 }

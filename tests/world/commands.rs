@@ -256,6 +256,28 @@ fn the_folder_of_predicted_flanges_is_made() {
 }
 
 #[test]
+fn a_table_of_joint_vectors_is_read_as_every_other_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path().join("points.csv");
+    let (names, row) = ("joint_a1,joint_a2,joint_a3,joint_a4,joint_a5,joint_a6", "10,-80,110,5,50,20");
+    let semicolons = format!("{names}\n{row}\n").replace(',', ";");
+    for (table, code, line) in [
+        (semicolons, Code::CsvSeparator, 1),
+        (format!("{names},joint_a6\n{row},25\n"), Code::CsvColumnTwice, 1),
+        (format!("{names}\n# taught by hand\n{row}\n"), Code::CsvSyntax, 2),
+        (format!("{names}\n{row},30\n"), Code::CsvCellCount, 2),
+        (format!("{names}\n"), Code::FileEmpty, 1),
+    ] {
+        std::fs::write(&at, table).unwrap();
+        let place = format!("{}:{line}", at.display());
+        let args = ["show", &root("reports/kr6_small/solution.json"), "--at", at.to_str().unwrap(), "--at-unit", "deg"];
+        let output = robotcal(&args);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert_says(&text(&output), code, &[&place]);
+    }
+}
+
+#[test]
 fn a_dry_run_says_all_that_it_counts() {
     let (urdf, run) = (root(KR6), root("datasets/bad/too-few-images"));
     let output = robotcal(&["identify", "--dry-run", "--robot-model", "full", "--urdf", &urdf, "--series", &run]);
