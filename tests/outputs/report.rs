@@ -356,6 +356,19 @@ fn local_errors_are_summed_up_and_make_no_columns() {
     assert_eq!(solution_json::read(&text).unwrap().robot, record.robot);
 }
 
+/// What agrees is said with the limit that was used, not with the usual one.
+#[test]
+fn the_scatter_is_judged_by_the_limit_that_was_used() {
+    let mut record = record();
+    record.scatter = Some(solution_json::ScatterRecord { flange_ratio: Some(2.0), larger_stated: false });
+    let agrees = |limit: f64| {
+        let mut record = record.clone();
+        record.options.as_mut().unwrap().limits.scatter_ratio = limit;
+        report_html(&record, &Thumbnails::default()).contains(&format!(" {limit}; "))
+    };
+    assert!(agrees(2.875) && !agrees(1.875));
+}
+
 #[test]
 fn the_page_names_the_files_that_are_there() {
     let mut record = record();

@@ -87,7 +87,7 @@ pub(super) fn workspace(r: &SolutionRecord) -> Markup {
         return html! {};
     }
     let inside = median(r.workspace.iter().filter(|w| w.covered).map(|w| 1e3 * w.sigma_m));
-    let bounds = bounds(r);
+    let (bounds, agree) = (bounds(r), r.limits().scatter_ratio);
     html! {
         p {
             "Uncertainty of the position of the flange relative to " (r.flange_is_relative_to()) ", one sigma over all three axes, by the calibrated model. "
@@ -103,7 +103,7 @@ pub(super) fn workspace(r: &SolutionRecord) -> Markup {
             p.note {
                 "Scatter between the images against the noise model: " (significant(ratio)) " times. "
                 @if s.larger_stated { "The larger sigmas are stated." }
-                @else if ratio <= 1.5 { "They agree within 1.5; the noise model's sigmas are stated." }
+                @else if ratio <= agree { "They agree within " (agree) "; the noise model's sigmas are stated." }
                 @else { "With so few images for what they tell, the scatter is no judge; the noise model's sigmas are stated." }
             }
         } }
