@@ -237,8 +237,7 @@ impl Kind for Mistake {
     }
 
     fn seen(&self) -> String {
-        let words = self.in_words();
-        if self.by_images { words } else { words.replace("image", "measurement") }
+        self.in_words(if self.by_images { "image" } else { "measurement" })
     }
 
     fn remedy(&self) -> String {
@@ -309,21 +308,22 @@ impl Kind for Mistake {
 }
 
 impl Mistake {
-    fn in_words(&self) -> String {
+    /// What was done wrong, by what shows it: `noun` names one of it.
+    fn in_words(&self, noun: &str) -> String {
         match &self.kind {
             MistakeKind::Signs(joints) => format!(
-                "the readings of {} have the wrong sign: with {} negated the images fit",
+                "the readings of {} have the wrong sign: with {} negated the {noun}s fit",
                 joints.join(" and "),
                 if let [one] = joints.as_slice() { one } else { "both" }
             ),
             MistakeKind::Columns(joints) if joints.len() == 2 => {
-                format!("the joints stand in another order: with {} exchanged the images fit", joints.join(" and "))
+                format!("the joints stand in another order: with {} exchanged the {noun}s fit", joints.join(" and "))
             }
             MistakeKind::Columns(joints) => {
                 let mut right = joints.clone();
                 right.rotate_left(1);
                 format!(
-                    "the joints stand in another order: with the columns {} taken for {} the images fit",
+                    "the joints stand in another order: with the columns {} taken for {} the {noun}s fit",
                     right.join(", "),
                     joints.join(", ")
                 )
@@ -333,29 +333,29 @@ impl Mistake {
                     .first()
                     .zip(joints.last())
                     .map_or(String::new(), |(a, b)| format!(", {a} in the place of {b} and so on"));
-                format!("the joints stand in reverse order{ends}: reversed, the images fit")
+                format!("the joints stand in reverse order{ends}: reversed, the {noun}s fit")
             }
             MistakeKind::Unit { joint, are_degrees } => {
                 let [is, read_as, _] = unit(*are_degrees);
                 let values = joint.as_ref().map_or("the joint values".into(), |j| format!("the readings of {j} alone"));
-                format!("{values} are {is}, read as {read_as}: converted, the images fit")
+                format!("{values} are {is}, read as {read_as}: converted, the {noun}s fit")
             }
             MistakeKind::SlideUnit { joint, unit, .. } => {
-                format!("the readings of {joint} are {unit}, read as metres: converted, the images fit")
+                format!("the readings of {joint} are {unit}, read as metres: converted, the {noun}s fit")
             }
             MistakeKind::Coupled { joints: [joint, before], is_sum } => format!(
-                "the controller counts {joint} together with {before}, as where J3 is counted from the ground: with {joint} {} {before} the images fit",
+                "the controller counts {joint} together with {before}, as where J3 is counted from the ground: with {joint} {} {before} the {noun}s fit",
                 if *is_sum { "plus" } else { "minus" }
             ),
             MistakeKind::Rows { below, part: Some(ShiftedPart { first, last, images, to_the_end }), .. } => {
                 let which = if *to_the_end { format!("from {first} on") } else { format!("from {first} to {last}") };
                 format!(
-                    "{which} images and joint readings are shifted by one row: {images} images fit the readings of the row {}, others their own",
+                    "{which} {noun}s and joint readings are shifted by one row: {images} {noun}s fit the readings of the row {}, others their own",
                     if *below { "below" } else { "above" }
                 )
             }
             MistakeKind::Rows { below, columns, part: None } => format!(
-                "images and {} are shifted by one row: every image fits the readings of the row {}",
+                "{noun}s and {} are shifted by one row: every {noun} fits the readings of the row {}",
                 match columns.as_slice() {
                     [] => "joint readings".to_owned(),
                     some => format!("the readings of {} alone", some.join(", ")),
@@ -363,13 +363,15 @@ impl Mistake {
                 if *below { "below" } else { "above" }
             ),
             MistakeKind::Mount(CameraMount::Hand) => {
-                "the camera is in the hand and the plate stands still: read so, the images fit".into()
+                format!("the camera is in the hand and the plate stands still: read so, the {noun}s fit")
             }
             MistakeKind::Mount(CameraMount::Fixed) => {
-                "the camera stands still and the plate is in the hand: read so, the images fit".into()
+                format!("the camera stands still and the plate is in the hand: read so, the {noun}s fit")
             }
             MistakeKind::Mirrored => {
-                "the images are mirrored (or their rows and columns are exchanged), or all joints that turn the arm to its sides count the other way: with either undone the images fit, and they do not tell which".into()
+                format!(
+                    "the {noun}s are mirrored (or their rows and columns are exchanged), or all joints that turn the arm to its sides count the other way: with either undone the {noun}s fit, and they do not tell which"
+                )
             }
             MistakeKind::Lengths { angle_rad, distance_m, constant } => {
                 let fit = format!(
@@ -390,6 +392,29 @@ impl Mistake {
                 1.0 / scale
             ),
             MistakeKind::Poses { what, .. } => what.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_measurements_show_keeps_the_names_of_the_user() {
+        let [first, last] = ["image_3", "image_9"].map(str::to_owned);
+        let part = Some(ShiftedPart { first, last, images: 7, to_the_end: false });
+        let kinds = [
+            MistakeKind::Rows { below: true, columns: Vec::new(), part },
+            MistakeKind::Signs(vec!["image_3".into(), "image_9".into()]),
+        ];
+        for kind in kinds {
+            let (of, rows_of) = ("tracker".to_owned(), RowsOf::Readings);
+            let of_measurements = Mistake { kind, of, misfit: 1.0, misfit_undone: None, by_images: false, rows_of };
+            let said = of_measurements.seen();
+            assert!(said.contains("image_3") && said.contains("image_9"), "{said}");
+            let of_images = Mistake { by_images: true, ..of_measurements };
+            assert_ne!(said, of_images.seen());
         }
     }
 }
