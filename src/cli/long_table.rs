@@ -266,7 +266,7 @@ fn evidences(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         return Ok(());
     }
     let all: Vec<String> = (r.evidences.iter())
-        .map(|e| format!("{:?} {:.1} ({} parameters)", e.model, e.log_evidence, e.parameters).to_lowercase())
+        .map(|e| format!("{} {:.1} ({} parameters)", e.model.name(), e.log_evidence, e.parameters))
         .collect();
     writeln!(out, "evidence  logarithm, relative to the best model: {}", all.join(", "))
 }

@@ -60,6 +60,11 @@ fn layout(options: &Options, chain: Chain, series: &[Series]) -> Result<(Layout,
     Ok((layout, state))
 }
 
+/// The files that say where the robot stood.
+fn files(series: &[Series]) -> String {
+    series.iter().map(|s| s.readings_file().display().to_string()).collect::<Vec<_>>().join(", ")
+}
+
 /// What the stops of `series` can tell of the robot, and what to add.
 ///
 /// # Errors
@@ -70,18 +75,13 @@ pub fn dry_run(chain: Chain, series: &[Series], options: &Options) -> Result<Ide
     if stops.is_empty() {
         return Err(Error::new(
             Code::ReadingsMissing,
-            "joints.csv",
+            files(series),
             "no row has joint readings",
             "record the joints of every stop",
         ));
     }
     let (layout, state) = layout(options, chain, series)?;
     identifiability_of_stops(&state.robot, &layout, &stops, &options.limits).ok_or_else(|| {
-        Error::new(
-            Code::FitUndetermined,
-            "stops",
-            "their information is not finite",
-            "check the readings in joints.csv",
-        )
+        Error::new(Code::FitUndetermined, files(series), "what its stops tell is not finite", "check the readings")
     })
 }

@@ -413,7 +413,7 @@ fn finish(start: Adjustment, limits: &Limits) -> Result<(Adjustment, FreePoses)>
             Error::new(
                 Code::NotConverged,
                 "free camera poses",
-                format!("the adjustment ended without converging ({:?})", outcome.status),
+                format!("the adjustment {}", outcome.status.words()),
                 "look at the images for a wrong plate, motion blur or changed focus",
             )
         }));

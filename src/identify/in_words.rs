@@ -9,7 +9,7 @@ impl Options {
             JointNoise::Estimated => "estimated".to_owned(),
             JointNoise::Known(sigma) => format!("{sigma} rad"),
         };
-        let mut model = format!("{:?}", self.model).to_lowercase();
+        let mut model = self.model.name().to_owned();
         if self.harmonics != Options::default().harmonics {
             model += &format!(", {} harmonics", self.harmonics);
         }

@@ -94,7 +94,7 @@ pub(super) fn fit_model(
     let free = &left.free;
     let mut starts = left.verdicts.clone();
     let on_robot = start.problem.used_on_robot().count();
-    check_on_robot(&start.problem, on_robot)?;
+    check_on_robot(&start.problem, on_robot, series)?;
     let aside =
         start_robot(&mut start, free, StartGiven { series, groups: &[], limits: &options.limits }, &mut starts)?;
     start_bodies(&mut start, series, &options.limits)?;
@@ -107,15 +107,9 @@ pub(super) fn fit_model(
     let mut diagnosis = Diagnosis::new(context);
     diagnosis.after_free_poses(&ended.adjustment().problem);
     diagnosis.after_left_out(ended.adjustment())?;
-    let advice = not_converged(&ended.adjustment().problem);
     let Ended { status, iterations, fit } = ended;
     if status != Status::Converged {
-        return Err(Error::new(
-            Code::NotConverged,
-            "joint fit",
-            format!("ended without converging ({status:?})"),
-            advice,
-        ));
+        return Err(Error::new(Code::NotConverged, "joint fit", status.words(), status.remedy()));
     }
     let fit = fit.map_err(|e| {
         Error::new(Code::FitUndetermined, "joint fit", e.to_string(), "take stops that move every joint")
@@ -282,14 +276,6 @@ fn name_wrong_pairs(adjustment: &mut Adjustment, free: &FreePoses, explained: f6
     }
 }
 
-/// What may keep a fit from its end.
-fn not_converged(problem: &Problem) -> &'static str {
-    if problem.images.is_empty() {
-        return "look for rows of other stops, and at the units of the readings and of what was measured";
-    }
-    "look at the per-image table for images that do not belong, and at the starting values"
-}
-
 /// A two-step calibration goes by camera poses.
 fn of_images_alone() -> Error {
     let what =
@@ -298,13 +284,13 @@ fn of_images_alone() -> Error {
 }
 
 /// Without images of the robot there is no robot to fit.
-fn check_on_robot(problem: &Problem, on_robot: usize) -> Result<()> {
+fn check_on_robot(problem: &Problem, on_robot: usize, series: &[MeasuredSeries]) -> Result<()> {
     let all = problem.images.len();
     match (0..all).filter(|&i| problem.on_robot(i)).count() {
         _ if on_robot > 0 || problem.used_bodies().next().is_some() => Ok(()),
         0 => Err(Error::new(
             Code::ReadingsMissing,
-            "joints.csv",
+            format!("joints.csv of {}", series.iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ")),
             format!(
                 "no row has joint readings: all {all} images were taken off the robot, and tell of the camera and the plate only"
             ),

@@ -60,8 +60,8 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) 
         return Err(Error::new(
             Code::NotConverged,
             "verification",
-            format!("camera and plate do not converge with this robot ({:?})", outcome.status),
-            "check that URDF, base, tip and series belong together",
+            format!("the fit of camera and plate with this robot {}", outcome.status.words()),
+            format!("check that URDF, base, tip and series belong together; else {}", outcome.status.remedy()),
         ));
     }
     let problem = &outcome.adjustment.problem;

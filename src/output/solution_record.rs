@@ -47,7 +47,7 @@ pub(super) fn record(
         inputs: context.inputs.clone(),
         estimator: solution.estimator,
         options: Some(solution.options.clone()),
-        status: format!("{:?}", solution.status).to_lowercase(),
+        status: solution.status.name().to_owned(),
         iterations: solution.iterations,
         failed_gates: solution.failed_gates(),
         accuracy: AccuracyRecord { nominal: accuracy.nominal, calibrated: accuracy.calibrated, folds: accuracy.folds },

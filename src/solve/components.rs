@@ -8,8 +8,9 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use super::acceleration::Acceleration;
 use super::body_components::{BodyTally, update_bodies};
 use super::fit::Fit;
-use super::levenberg::{Minimised, Outcome, Settings, Status, minimise, minimise_near, minimise_with_priors};
+use super::levenberg::{Minimised, Outcome, Settings, minimise, minimise_near, minimise_with_priors};
 use super::linear::{LinearImage, LinearStop};
+use super::status::Status;
 use super::tally::JOINT_NOISE_FLOOR;
 use crate::problem::{Adjustment, Noise, Problem};
 

@@ -6,6 +6,7 @@ use super::covariance::Covariance;
 use super::fit::Fit;
 use super::linear::{LinearProblem, Linearised};
 use super::linearised_adjustment::LinearisedAdjustment;
+use super::status::Status;
 use super::system::{Elimination, Singular, System};
 use crate::linalg::SymmetricFactor;
 use crate::problem::{Adjustment, State, Step};
@@ -41,19 +42,6 @@ impl Default for Settings {
 
 /// Share of a sum of squares that is far below what so many are known to: 0.05 of a sigma for a hundred stops.
 const SQUARE_A_STOP: f64 = 2.5e-5;
-
-/// How the iteration ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
-    /// The last step was below the bound.
-    Converged,
-    /// No step lowered the cost any more.
-    Stalled,
-    /// The bound on the iterations was reached.
-    OutOfIterations,
-    /// A marker lies behind its camera at the starting values, or they are not finite.
-    BadStart,
-}
 
 /// What the iteration reached.
 #[derive(Debug, Clone)]

@@ -15,6 +15,16 @@ pub enum RobotModel {
 }
 
 impl RobotModel {
+    /// Its name in options and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rigid => "rigid",
+            Self::Gear => "gear",
+            Self::Full => "full",
+            Self::Auto => "auto",
+        }
+    }
+
     /// What it is, for people.
     pub fn title(self) -> &'static str {
         match self {

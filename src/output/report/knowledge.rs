@@ -66,7 +66,7 @@ pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
             div.wide { table {
                 thead { tr { th { "Model" } th.n { "log evidence, relative" } th.n { "parameters" } } }
                 tbody { @for e in &r.evidences { tr {
-                    td { (format!("{:?}", e.model).to_lowercase()) } td.n { (format!("{:.1}", e.log_evidence)) } td.n { (e.parameters) }
+                    td { (e.model.name()) } td.n { (format!("{:.1}", e.log_evidence)) } td.n { (e.parameters) }
                 } } }
             } }
         }
