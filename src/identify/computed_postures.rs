@@ -16,8 +16,8 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector, Matrix6};
-use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::free_poses::free_poses_of;
@@ -229,7 +229,7 @@ impl Stops {
     fn chosen(&self, from: Before, limits: &Limits) -> Option<(Choice, bool)> {
         let first = std::iter::once(self.settled(vec![0; self.all.len()]));
         let random = |seed| {
-            let mut rng = SmallRng::seed_from_u64(seed);
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
             self.settled(self.all.iter().map(|s| rng.random_range(0..s.candidates.len())).collect())
         };
         let random: Vec<Option<Choice>> = (0..STARTS).into_par_iter().map(random).collect();

@@ -2,7 +2,7 @@
 //! of the nominal robot.
 
 use rand::SeedableRng;
-use rand::rngs::SmallRng;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::error::{Code, Error, Notice, Quantity, Result};
@@ -242,7 +242,7 @@ impl Arm {
 
     /// Postures that reach a pose, from starts all over the limits.
     fn postures_of(&self, pose: &Pose) -> Vec<Vec<f64>> {
-        let mut rng = SmallRng::seed_from_u64(0);
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
         let start = |_| random_readings(&self.limits, &self.robot.chain.reading_kinds, &mut rng);
         let starts: Vec<Vec<f64>> = (0..POSTURE_STARTS).map(start).collect();
         starts.iter().filter_map(|s| solve_from(&self.robot, &self.limits, pose, s)).collect()

@@ -10,4 +10,5 @@ mod features;
 mod imports;
 mod limits;
 mod pages;
+mod random;
 mod sentences;
