@@ -5,8 +5,8 @@ use super::kind::{CheckContext, Weight};
 use super::{
     camera_model, camera_pattern, contradicted_distances, exchanged_readings, extrapolates, few_images, focus,
     held_near_nominal, joint_noise, left_out_bodies, left_out_images, left_out_observations, length_standard, loose,
-    marker_off, measurement_scatter, moved, no_gain, parameter_off, plate_size, pose_step, repeated_measurements,
-    scatter, shifted_measurements, stated_noise, tag_size, undetermined, zeros_off,
+    many_left_out, marker_off, measurement_scatter, moved, no_gain, odd_image, parameter_off, plate_size, pose_step,
+    repeated_measurements, scatter, shifted_measurements, small_gain, stated_noise, tag_size, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -82,7 +82,10 @@ pub const CHECKS: &[Check] = &[
     },
     check("moved", Stage::LeftOut(|a, s| found(moved::check(a, s)))),
     check("exchanged_readings", Stage::LeftOut(|a, _| found(exchanged_readings::check(a)))),
-    check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s)))),
+    Check {
+        explains: |_, other| matches!(other, Finding::ManyLeftOut(_)),
+        ..check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s))))
+    },
     check("shifted_measurements", Stage::LeftOut(|a, s| found(shifted_measurements::check(a, s)))),
     check("repeated_measurements", Stage::LeftOut(|a, s| found(repeated_measurements::check(a, s)))),
     check("left_out_bodies", Stage::LeftOut(|a, s| found(left_out_bodies::check(a, s)))),
@@ -109,13 +112,16 @@ pub const CHECKS: &[Check] = &[
     check("held_near_nominal", Stage::Fit(|a, b, s| found(held_near_nominal::check(a, b, s)))),
     check("extrapolates", Stage::Uncertainty(|a, b, s| found(extrapolates::check(a, b, s)))),
     check("undetermined", Stage::Uncertainty(|a, b, s| found(undetermined::check(a, b, s)))),
+    check("many_left_out", Stage::LeftOut(|a, s| found(many_left_out::check(a, s)))),
+    check("small_gain", Stage::Fit(|a, b, s| found(small_gain::check(a, b, s)))),
+    check("odd_image", Stage::Fit(|a, b, s| found(odd_image::check(a, b, s)))),
 ];
 
 /// True of what readings computed from poses of a tool, or in a frame, look like: there they are the finding. `mountings`: names of those of
 /// the series with such poses; another is loose by itself.
 pub fn follows_from_tool(finding: &Finding, mountings: &[&str]) -> bool {
     match finding {
-        Finding::JointNoiseLarge(_) | Finding::NoGain(_) => true,
+        Finding::JointNoiseLarge(_) | Finding::NoGain(_) | Finding::SmallGain(_) => true,
         Finding::LooseMounting(loose) => mountings.contains(&loose.mounting.as_str()),
         _ => false,
     }

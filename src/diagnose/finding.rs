@@ -20,17 +20,20 @@ use super::left_out_observations::ObservationsLeftOut;
 use super::length_standard::ContradictedLengths;
 use super::lens_not_in_ros::LensNotInRos;
 use super::loose::LooseMounting;
+use super::many_left_out::ManyLeftOut;
 use super::marker_off::MarkerOff;
 use super::measurement_scatter::MeasurementsScatter;
 use super::mistake::Mistake;
 use super::moved::BodyMoved;
 use super::no_gain::NoGain;
 use super::noticed::Noticed;
+use super::odd_image::OddImage;
 use super::parameter_off::ParameterOff;
 use super::plate_size::DoubtedSize;
 use super::repeated_measurements::RepeatedMeasurements;
 use super::scatter::LargeScatter;
 use super::shifted_measurements::ShiftedMeasurements;
+use super::small_gain::SmallGain;
 use super::stated_noise::NoiseContradicted;
 use super::tag_size::TagsOff;
 use super::tool_in_poses::ToolInPoses;
@@ -83,6 +86,7 @@ findings! {
     LargeScatter,
     LensNotInRos,
     LooseMounting,
+    ManyLeftOut,
     MarkerOff,
     MeasurementsLeftOut,
     MeasurementsScatter,
@@ -92,10 +96,12 @@ findings! {
     NoiseContradicted,
     Noticed,
     ObservationsLeftOut,
+    OddImage,
     ParameterOff,
     RepeatedMeasurements,
     ResidualPattern,
     ShiftedMeasurements,
+    SmallGain,
     TagsOff,
     ToolInPoses,
     ZeroMoved,

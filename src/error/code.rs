@@ -335,6 +335,8 @@ codes! {
         ParameterOff "parameter_off" "a parameter is far from what robots usually have",
         LargeScatter "large_scatter" "images scatter more than the noise model says",
         ZeroOff "zero_off" "the zero of a joint is far from that of the URDF, or it counts the other way",
+        SmallGain "small_gain" "the calibrated robot is hardly better than the nominal one",
+        OddImage "odd_image" "an image is predicted far worse than the others",
         FlangeUndetermined "flange_undetermined" "the data do not determine the flange",
     }
     Input "Touches" {

@@ -7,7 +7,9 @@ use super::lens_choice::{choose_lens, open_cameras};
 use super::solution::Solution;
 use super::start_verdict::StartVerdict;
 use crate::assess::{Limits, camera_shows_pattern};
-use crate::diagnose::{CheckContext, Diagnosis, Finding, observations_left_out, residual_pattern, tags_off};
+use crate::diagnose::{
+    CheckContext, Diagnosis, Finding, many_left_out, observations_left_out, residual_pattern, tags_off,
+};
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{Fit, FreePose, FreePoses, PlacedCamera};
 use crate::geom::skew;
@@ -99,6 +101,7 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
         Diagnosis::new(CheckContext { series: &series, free: &free_poses, on_robot: 0, stated_noise: None, limits });
     diagnosis.after_free_poses(&fit.problem);
     let mut findings = diagnosis.findings();
+    findings.extend(many_left_out(&fit.problem, limits).map(Finding::from));
     findings.extend(observations_left_out(&fit, limits).map(Finding::from));
     findings.extend(residual_pattern(&fit, limits).map(Finding::from));
     findings.extend(tags_off(&fit, limits).into_iter().map(Finding::from));

@@ -1,6 +1,5 @@
 //! The verdict: may this result be used? Terminal and report say the same.
 
-use crate::assess::Limits;
 use crate::error::{Code, Notice};
 use crate::output::poses_record::PosesRecord;
 use crate::output::solution_json::SolutionRecord;
@@ -43,7 +42,7 @@ impl Verdict {
             let reasons: Vec<VerdictReason> = record.failed_gates.iter().map(|gate| of_gate(record, gate)).collect();
             return Self::failed(reasons, of_rows(record));
         }
-        Self::not_failed(doubts(record))
+        Self::not_failed(noted(&record.notices).collect())
     }
 
     /// Of poses from images alone.
@@ -53,9 +52,7 @@ impl Verdict {
         if !failed.is_empty() {
             return Self::failed(failed, std::iter::empty());
         }
-        let (all, out) = (record.images.len(), record.images.iter().filter(|i| !i.is_used()).count());
-        let many = left_out([out, all], "images", "look at their reasons (report)", &record.limits);
-        Self::not_failed(noted(&record.notices).chain(many).collect())
+        Self::not_failed(noted(&record.notices).collect())
     }
 
     fn failed(reasons: Vec<VerdictReason>, others: impl Iterator<Item = String>) -> Self {
@@ -81,14 +78,6 @@ fn of_gate(record: &SolutionRecord, sentence: &str) -> VerdictReason {
     let found = record.findings.iter().find(|f| f.text == sentence && !f.seen.is_empty());
     let (what, remedy) = found.map_or((sentence, ""), |f| (f.seen.as_str(), f.remedy.as_str()));
     VerdictReason { what: what.to_owned(), remedy: remedy.to_owned() }
-}
-
-fn doubts(r: &SolutionRecord) -> Vec<VerdictReason> {
-    let on_robot = || r.images.iter().filter(|i| i.is_on_robot());
-    let (all, out) = (on_robot().count(), on_robot().filter(|i| !i.is_used()).count());
-    let many =
-        left_out([out, all], "images of the robot", "look at their reasons (report, or show --all)", &r.limits());
-    noted(&r.notices).chain(many).chain(small_gain(r)).chain(odd_image(r)).collect()
 }
 
 /// Notices that ask for a look.
@@ -117,32 +106,4 @@ fn is_information(code: Code) -> bool {
             | Code::SecondArmRenamed
             | Code::TipChosen
     )
-}
-
-fn left_out([out, all]: [usize; 2], images: &str, remedy: &str, limits: &Limits) -> Option<VerdictReason> {
-    let many = out as f64 > limits.doubtful_share_left_out * all as f64;
-    many.then(|| VerdictReason { what: format!("{out} of {all} {images} were left out"), remedy: remedy.to_owned() })
-}
-
-fn small_gain(r: &SolutionRecord) -> Option<VerdictReason> {
-    let (before, after) = (r.accuracy.nominal.rms_mm, r.accuracy.calibrated.rms_mm);
-    let was_free = r.identifiability.as_ref().is_none_or(|i| i.parameters > 0);
-    let small = was_free && after * r.limits().doubtful_gain > before;
-    small.then(|| VerdictReason {
-        what: format!("the gain is small: {before:.3} mm before, {after:.3} mm after, on held-out images"),
-        remedy:
-            "the robot repeats no better, or the stops move its joints too little: take more, and more different ones"
-                .into(),
-    })
-}
-
-fn odd_image(r: &SolutionRecord) -> Option<VerdictReason> {
-    let after = &r.accuracy.calibrated;
-    let odd = after.worst_mm > r.limits().doubtful_odd_image * after.rms_mm;
-    let error = |i: &&crate::output::solution_json::ImageRecord| i.held_out_mm.map_or(0.0, |e| e[1]);
-    let worst = r.images.iter().max_by(|a, b| error(a).total_cmp(&error(b)))?;
-    odd.then(|| VerdictReason {
-        what: format!("image {} is off by {:.3} mm, far more than the others", worst.name, after.worst_mm),
-        remedy: "look at it in the report; did the arm stand still?".into(),
-    })
 }

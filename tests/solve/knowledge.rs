@@ -19,8 +19,9 @@ use robotcal::model::joint_terms::{JointTerm, Term, TermKind};
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::output::difference::compare_solutions;
 use robotcal::output::restore::{found_model, measured_series, robot_description};
+use robotcal::output::verdict::Verdict;
 use robotcal::output::{files, solution_json};
-use robotcal::problem::{Layout, Names, State, short_name};
+use robotcal::problem::{ImageRejection, Layout, Names, State, short_name};
 use robotcal::series::{CameraMount, Marker, Observation, Plate, PlateKind};
 use robotcal::simulate::truth::{TrueTerm, Truth};
 use robotcal::simulate::{RobotErrors, WorldRequest, series};
@@ -384,6 +385,44 @@ fn exact_readings_leave_no_tilt_to_be_stated() {
     let exact = Options { joint_noise: JointNoise::Known(0.0), model: RobotModel::Rigid, ..Options::default() };
     let record = record_of(&identify(chain(), &[world(2, 0.0)], &exact).unwrap());
     assert_eq!(record.cameras[0].apparent_tilt_rad, 0.0);
+}
+
+/// What is left out of a fit is decided by the limits that were given.
+#[test]
+fn narrow_limits_leave_more_observations_out() {
+    let seen = world(4, 2e-5);
+    let left_out = |sigmas: f64| {
+        let usual = Limits::default();
+        let limits = Limits { observation_sigmas: sigmas, observation_back_sigmas: 0.9 * sigmas, ..usual };
+        let options = Options { model: RobotModel::Rigid, limits, ..Options::default() };
+        let found = identify(chain(), std::slice::from_ref(&seen), &options).unwrap();
+        found.fit.problem.images.iter().map(|i| i.observations.len() - i.used().count()).sum::<usize>()
+    };
+    let [usual, narrow] = [4.5, 3.0].map(left_out);
+    assert!(narrow > usual + 5, "{usual} and {narrow}");
+}
+
+/// What the terminal counts as a doubt is a finding, which programs read.
+#[test]
+fn every_doubt_is_a_finding_with_a_code() {
+    let mut seen = world(4, 2e-5);
+    let without = seen.stops.len() - 1;
+    seen.stops[without].observations = Vec::new().into();
+    seen.stops[without].left_out = Some(ImageRejection::NoObservations);
+    let doubtful =
+        Limits { doubtful_share_left_out: 0.01, doubtful_gain: 1e9, doubtful_odd_image: 0.5, ..Limits::default() };
+    let doubts = [Code::ImagesLeftOut, Code::SmallGain, Code::OddImage];
+    for (limits, found) in [(doubtful, true), (Limits::default(), false)] {
+        let options = Options { model: RobotModel::Rigid, limits, ..Options::default() };
+        let record = record_of(&identify(chain(), std::slice::from_ref(&seen), &options).unwrap());
+        for code in doubts {
+            let own: Vec<_> = record.findings.iter().filter(|f| f.code == code).collect();
+            assert_eq!(own.len(), usize::from(found), "{code}: {:?}", record.findings);
+            assert!(own.iter().all(|f| f.weight == Weight::Note && !f.remedy.is_empty()));
+        }
+        let asked = Verdict::of(&record).reasons.len();
+        assert!(record.failed_gates.is_empty() && asked >= if found { 3 } else { 0 }, "{asked}");
+    }
 }
 
 #[test]

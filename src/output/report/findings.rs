@@ -5,21 +5,15 @@ use maud::{Markup, html};
 use crate::error::Notice;
 use crate::output::verdict::{Trust, Verdict, VerdictReason};
 
-/// Failed gates or doubts, then notes.
+/// Failed gates, then notes: doubts are some of them.
 pub(super) fn section(v: &Verdict, notices: &[Notice]) -> Markup {
-    // Most doubts are notes, and stand there.
-    let is_noted = |reason: &&VerdictReason| notices.iter().any(|n| reason.what.ends_with(&n.what));
-    let others: Vec<&VerdictReason> = v.reasons.iter().filter(|reason| !is_noted(reason)).collect();
     html! {
         @match v.trust {
             Trust::Good => p { "Every check passed." },
-            Trust::Doubts => {
-                @if others.is_empty() { p { "No check failed; some of the notes ask for a look." } }
-                @else { p { "No check failed. What asks for a look:" } (list(others)) }
-            },
+            Trust::Doubts => p { "No check failed; some of the notes ask for a look." },
             Trust::Failed => {
                 h3 { "Checks that failed" }
-                (list(v.reasons.iter()))
+                (list(&v.reasons))
             },
         }
         @if !notices.is_empty() {
@@ -29,7 +23,7 @@ pub(super) fn section(v: &Verdict, notices: &[Notice]) -> Markup {
     }
 }
 
-fn list<'a>(reasons: impl IntoIterator<Item = &'a VerdictReason>) -> Markup {
+fn list(reasons: &[VerdictReason]) -> Markup {
     html! {
         ul { @for reason in reasons { li { b { (reason.what) } (remedy(&reason.remedy)) } } }
     }
