@@ -4,7 +4,8 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
+use serde::de::Visitor;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// What kind of failure it was; fixes the exit code of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,11 +19,10 @@ pub enum ErrorKind {
 macro_rules! codes {
     ($($kind:ident $title:literal { $($code:ident $name:literal $meaning:literal,)+ })+) => {
         /// What is wrong with what, or what was noticed of what: errors, notices and findings say it, and programs may rely on its name.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Code {
             $($(
                 #[doc = $meaning]
-                #[serde(rename = $name)]
                 $code,
             )+)+
         }
@@ -30,6 +30,9 @@ macro_rules! codes {
         impl Code {
             /// Every code, in the order of the table.
             pub const ALL: &[Self] = &[$($(Self::$code,)+)+];
+
+            /// Their names, in the same order.
+            const NAMES: &[&str] = &[$($($name,)+)+];
 
             /// Stable name for programs, `snake_case`.
             pub const fn name(self) -> &'static str {
@@ -332,11 +335,11 @@ codes! {
         MarkerOff "marker_off" "a marker is far from where the plate file says",
         TagsOff "tags_off" "the tags of a plate have another size beside their distance than the plate file says",
         NoGain "no_gain" "the calibrated robot is no better than the nominal one",
+        SmallGain "small_gain" "the calibrated robot is hardly better than the nominal one",
+        OddImage "odd_image" "an image is predicted far worse than the others",
         ParameterOff "parameter_off" "a parameter is far from what robots usually have",
         LargeScatter "large_scatter" "images scatter more than the noise model says",
         ZeroOff "zero_off" "the zero of a joint is far from that of the URDF, or it counts the other way",
-        SmallGain "small_gain" "the calibrated robot is hardly better than the nominal one",
-        OddImage "odd_image" "an image is predicted far worse than the others",
         FlangeUndetermined "flange_undetermined" "the data do not determine the flange",
     }
     Input "Touches" {
@@ -380,5 +383,51 @@ impl Code {
 impl fmt::Display for Code {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
+    }
+}
+
+impl Serialize for Code {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for Code {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_str(ByName)
+    }
+}
+
+/// Reads a code by its name. What serde derives for so many is much code.
+struct ByName;
+
+impl Visitor<'_> for ByName {
+    type Value = Code;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the name of a code")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Code, E> {
+        let found = Code::ALL.iter().find(|code| code.name() == name).copied();
+        found.ok_or_else(|| E::unknown_variant(name, Code::NAMES))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Code;
+
+    #[test]
+    fn a_code_is_written_and_read_by_its_name_alone() {
+        for (code, name) in Code::ALL.iter().zip(Code::NAMES) {
+            assert_eq!(code.name(), *name);
+            let text = serde_json::to_string(code).unwrap();
+            assert_eq!(text, format!("\"{name}\""));
+            assert_eq!(serde_json::from_str::<Code>(&text).unwrap(), *code);
+        }
+        let refused = serde_json::from_str::<Code>("\"no_such_code\"").unwrap_err().to_string();
+        assert!(refused.contains("no_such_code") && refused.contains(Code::Noticed.name()), "{refused}");
+        assert!(serde_json::from_str::<Code>("3").is_err());
     }
 }
