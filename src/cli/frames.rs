@@ -189,10 +189,10 @@ fn gate(code: Code, subject: &str, quantities: BTreeMap<String, f64>, text: Stri
     FileFinding { code, weight: Weight::Gate, subject: subject.to_owned(), quantities, text }
 }
 
-/// The failure with the folder that it is about.
+/// The failure of the fit with the folders of the touches that it is about.
 fn named(error: Error, args: &FramesArgs) -> Error {
     let folders: Vec<String> = args.touches.iter().map(|t| t.display().to_string()).collect();
-    if error.place == "touches" && !folders.is_empty() { Error { place: folders.join(", "), ..error } } else { error }
+    if folders.is_empty() { error } else { Error { place: folders.join(", "), ..error } }
 }
 
 fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotDescription) -> Result<Measured> {
