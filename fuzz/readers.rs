@@ -7,7 +7,10 @@ use robotcal::geom::Pose;
 use robotcal::identify::RobotModel;
 use robotcal::output::{parse_compensation, plan_start, restore, solution_json};
 use robotcal::programs::{self, Language, TextFile};
-use robotcal::series::{Manifest, Plate, PlateKind, RecordingOptions, Stops, extract, parse_observations, parse_plate};
+use robotcal::series::{
+    Manifest, Plate, PlateKind, RecordingOptions, RotationKind, Stops, extract, parse_controller, parse_observations,
+    parse_plate,
+};
 use robotcal::urdf::{Chain, RobotDescription, patch_origins};
 
 const ROBOT: &str = "<robot name='r'><link name='a'/><link name='b'/><link name='c'/><link name='d'/><link name='e'/>\
@@ -25,10 +28,11 @@ fn chain() -> Chain {
 }
 
 /// Names of the readers: those of the targets and of the folders of the corpus.
-pub const NAMES: [&str; 13] = [
+pub const NAMES: [&str; 14] = [
     "urdf",
     "series",
     "joints",
+    "controller",
     "plate",
     "observations",
     "solution",
@@ -49,6 +53,11 @@ pub fn read(name: &str, bytes: &[u8]) {
         "urdf" => urdf(&text()),
         "series" => drop(Manifest::parse(path, &text())),
         "joints" => drop(Stops::parse(path, &text())),
+        "controller" => {
+            for kind in RotationKind::ALL {
+                drop(parse_controller(path, &text(), kind));
+            }
+        }
         "plate" => {
             // plate.toml, then the marker file behind a line of its own.
             let text = text();

@@ -243,7 +243,7 @@ fn named(v: &DVector<f64>, names: &[String], least_part: f64) -> Vec<(String, f6
 }
 
 /// Names of the parameters that move the whole base, and of those that move the whole tip.
-pub fn frame_parameters(robot: &Robot) -> [Vec<String>; 2] {
+fn frame_parameters(robot: &Robot) -> [Vec<String>; 2] {
     let chain = &robot.chain;
     let origin = |name: &str| format!("{}.origin", name.replace('/', "."));
     let before =

@@ -36,8 +36,7 @@ pub use hold_out::{
 };
 pub use hold_out_bodies::hold_out_bodies;
 pub use identifiability::{
-    Cause, Correlation, Identifiability, Observability, UnknownDirection, frame_parameters, identifiability,
-    identifiability_of_stops,
+    Cause, Correlation, Identifiability, Observability, UnknownDirection, identifiability, identifiability_of_stops,
 };
 pub use in_base::sigma_in_base;
 pub use limits::Limits;

@@ -10,11 +10,11 @@ use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind, MOST_SIDE_PX, decode_picture, jpeg};
 
 /// Weights of red, green and blue in the grey value (luma of ITU-R BT.709), applied to the stored counts.
-pub const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
+const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 /// Reads an image (png, tif, pgm, jpg, bmp; 8 or 16 bit, grey or colour; colour tif of 32-bit floating point, too) without reducing its depth.
 ///
-/// Colour becomes grey with [`LUMA_WEIGHTS`]; an alpha channel is ignored. `bits` says how many bits of a 16-bit file
+/// Colour becomes grey by the luma of ITU-R BT.709; an alpha channel is ignored. `bits` says how many bits of a 16-bit file
 /// are used when they sit in its low end (10 or 12 for most machine cameras), which fixes the saturation count.
 ///
 /// # Errors

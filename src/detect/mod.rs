@@ -38,7 +38,7 @@ pub use detection::{Circles, Detection, Dropped, Outline, Sizes};
 pub use dot_sizes::set_radii;
 pub use flat_field::FlatField;
 pub use flat_field_facts::{FlatFieldFacts, LightDrift};
-pub use load::{LUMA_WEIGHTS, load, load_bytes};
+pub use load::{load, load_bytes};
 pub use picture::Picture;
 pub use run::{SeriesImage, detect_series};
 

@@ -208,8 +208,21 @@ impl<'a> Diagnosis<'a> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
     use super::*;
     use crate::diagnose::LooseMounting;
+
+    #[test]
+    fn every_check_is_named_after_its_file() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/diagnose");
+        for check in CHECKS {
+            assert!(folder.join(format!("{}.rs", check.name)).is_file(), "{}", check.name);
+        }
+        let names: BTreeSet<&str> = CHECKS.iter().map(|check| check.name).collect();
+        assert_eq!(names.len(), CHECKS.len());
+    }
 
     #[test]
     fn a_camera_of_another_series_is_loose_whatever_the_poses_of_one_are() {

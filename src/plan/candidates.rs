@@ -100,7 +100,7 @@ const ANEW: f64 = 0.2;
 const VIEWS_PER_CANDIDATE: usize = 12;
 
 /// Joint limits with a margin.
-pub fn narrowed_limits(setting: &Setting, margin: f64) -> Vec<(f64, f64)> {
+fn narrowed_limits(setting: &Setting, margin: f64) -> Vec<(f64, f64)> {
     let limits = reading_limits(&setting.robot.chain);
     limits.iter().map(|&(l, h)| if h - l > 4.0 * margin { (l + margin, h - margin) } else { (l, h) }).collect()
 }

@@ -16,7 +16,7 @@ pub struct Leg {
 }
 
 /// Greatest step between two collision checks, rad or m of any joint.
-pub const CHECK_STEP: f64 = 0.03;
+const CHECK_STEP: f64 = 0.03;
 /// What a blocked way counts in addition, rad.
 const BLOCKED: f64 = 4.0;
 /// What the whole imbalance of one joint counts, as a share of the length of the tour.

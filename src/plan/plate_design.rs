@@ -6,7 +6,7 @@
 
 use super::plate_code::{CodeDistance, PlateCode, WINDOW_LONG, WINDOW_SHORT};
 use crate::error::{Code, Error, Result};
-use crate::series::{Ink, Marker, Plate, PlateKind};
+use crate::series::{Ink, Plate, PlateKind};
 
 /// Outer radius of a small marker as a share of the pitch.
 pub const SMALL_RADIUS: f64 = 0.20;
@@ -19,7 +19,7 @@ pub const LEAST_MINOR_AXIS_PX: f64 = 7.0;
 /// Cells in which any two windows must differ.
 pub const LEAST_CODE_DISTANCE: u32 = 4;
 /// Width of the strip beside the quiet zone for axes and printers' margins, m.
-pub const SIDE_STRIP_M: f64 = 0.013;
+const SIDE_STRIP_M: f64 = 0.013;
 /// Height of the strips above and below the quiet zone, for scale bar and text, m.
 pub const TEXT_STRIP_M: f64 = 0.023;
 
@@ -206,12 +206,6 @@ fn class_radii(symbol: u8, pitch_m: f64) -> (f64, f64) {
     (outer, if symbol & 2 == 0 { 0.0 } else { outer * INNER_SHARE })
 }
 
-/// The code symbol of a marker by the classes of [`design`]; for reading a plate back.
-pub fn symbol_of(marker: &Marker, pitch_m: f64) -> u8 {
-    let large = marker.outer_radius_m > pitch_m * (SMALL_RADIUS + LARGE_RADIUS) / 2.0;
-    u8::from(large) + 2 * u8::from(marker.inner_radius_m > 0.0)
-}
-
 fn shape(request: &PlateRequest) -> Result<(u32, u32)> {
     let (columns, rows) = match (request.shape, request.markers) {
         (Some(shape), _) => shape,
@@ -376,7 +370,10 @@ mod tests {
         assert!(made.code.rotated >= 6, "{:?}", made.code);
         // Every class carries about a quarter of the markers (4 sigma of a fair draw: 39).
         let mut counts = [0_i32; 4];
-        made.plate.markers.iter().for_each(|m| counts[usize::from(symbol_of(m, 0.018))] += 1);
+        for marker in &made.plate.markers {
+            let symbol = (0..4).find(|s| class_radii(*s, 0.018) == (marker.outer_radius_m, marker.inner_radius_m));
+            counts[usize::from(symbol.unwrap())] += 1;
+        }
         assert!(counts.iter().all(|c| (c - 126).abs() < 39), "{counts:?}");
     }
 

@@ -45,7 +45,7 @@ pub struct PlannedStop {
 }
 
 /// The least joint noise that is planned with, rad or m.
-pub const LEAST_JOINT_SIGMA: f64 = 1e-6;
+const LEAST_JOINT_SIGMA: f64 = 1e-6;
 
 impl Setting {
     /// A problem with the columns of this setting and no image, at the state about which it is linearised.

@@ -51,7 +51,7 @@ pub use measured_series::{
 pub use noise::Noise;
 pub use plate_distance::{PlateDistance, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance};
 pub use plate_shape::PlateShape;
-pub use postures::{common_readings, joined, posture_groups, related_readings};
+pub use postures::{joined, posture_groups, related_readings};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
 pub use restraint::{JointPrior, Restraint};
 pub use select::short_name;

@@ -24,7 +24,7 @@ pub fn related_readings(a: &Posture, b: &Posture) -> [Vec<usize>; 2] {
 }
 
 /// Readings that two stops have in common; empty where it may be chance.
-pub fn common_readings(a: &Posture, b: &Posture) -> Vec<usize> {
+fn common_readings(a: &Posture, b: &Posture) -> Vec<usize> {
     let [common, _] = related_readings(a, b);
     common
 }

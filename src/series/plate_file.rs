@@ -17,7 +17,7 @@ use crate::error::{Code, Error, Result};
 use crate::files::FileKind;
 
 /// Prior sigma of a printed marker where the plate states none, m.
-pub const DEFAULT_TOLERANCE_M: f64 = 1e-4;
+const DEFAULT_TOLERANCE_M: f64 = 1e-4;
 
 const KNOWN: [&str; 10] =
     ["id", "x_m", "y_m", "z_m", "outer_radius_m", "inner_radius_m", "sigma_m", "sigma_x_m", "sigma_y_m", "sigma_z_m"];
