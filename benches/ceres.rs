@@ -146,6 +146,7 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
         families: Vec::new(),
         restraint: None,
         huber: f64::INFINITY,
+        bounds: robotcal::assess::Limits::default().bounds(),
     };
     Ok(Adjustment { problem, state })
 }

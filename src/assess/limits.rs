@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::problem::Bounds;
+
 macro_rules! limits {
     ($($(#[$doc:meta])+ $name:ident: $kind:ty = $value:expr;)+) => {
         /// Numbers that decide verdicts.
@@ -49,6 +51,18 @@ limits! {
     hopeless_share_of_images_left_out: f64 = 0.5;
     /// Share of single observations that may be left out: clean data lose 4e-5.
     share_of_observations_left_out: f64 = 0.05;
+    /// Normalised length of the residual beyond which a single observation is left out: a clean one is so with a probability of 4e-5.
+    observation_sigmas: f64 = 4.5;
+    /// Length below which it comes back: one that stands at the bound does not change sides with every round.
+    observation_back_sigmas: f64 = 4.0;
+    /// Joint error of an image or measurement, in robust sigmas per joint, beyond which it does not belong to its readings.
+    joint_error_sigmas: f64 = 8.0;
+    /// Smallest robust sigma of a joint that is believed there, rad or m: robots repeat to some 0.1 mrad.
+    joint_error_sigma: f64 = 1e-4;
+    /// Length of the residual of a measured point, in sigmas, beyond which it is left out: noise is so with a probability of 4e-5.
+    point_sigmas: f64 = 4.79;
+    /// The same of a measured pose.
+    pose_sigmas: f64 = 5.52;
     /// Images of the robot below which the prior decides much of the result: a 6R arm has some 30 parameters, six rows an image.
     few_images: usize = 20;
     /// Share of the robot's images left out from which a result asks for a look.
@@ -208,6 +222,8 @@ limits! {
     same_tool_m: f64 = 0.05;
     /// Angle between them, where the measured one has an orientation.
     same_tool_rad: f64 = 0.1;
+    /// Differences of height within which touched places count as one plane, m.
+    flat_places_m: f64 = 1e-3;
     /// How many times nearer to a measured frame than the next one a frame of a program must be to count as that one: a cell is off by
     /// less than a third of what lies between two of its frames, or nothing tells them apart.
     frame_clearly_nearer: f64 = 3.0;
@@ -283,6 +299,8 @@ limits! {
     /// Fewest regions, and fewest postures that are held out as wholes: a fit needs two others to hold on to.
     regions: usize = 3;
 
+    /// How far, RMS, measured points may be from where a robot puts them, m: robots miss by millimetres, other robots and readings by more.
+    far_points_m: f64 = 0.05;
     /// Error of a model in another measurement over the most that its solution states (the upper end of the 95 % interval) from which it is no
     /// longer the robot: sigmas are believed to a factor of two. Between one and this it is a doubt.
     beyond_stated: f64 = 2.0;
@@ -294,6 +312,17 @@ limits! {
 }
 
 impl Limits {
+    /// Those of what is left out of a fit.
+    pub const fn bounds(&self) -> Bounds {
+        Bounds {
+            observation: self.observation_sigmas,
+            observation_back: self.observation_back_sigmas,
+            joint_error: self.joint_error_sigmas,
+            joint_sigma: self.joint_error_sigma,
+            body: [self.point_sigmas, self.pose_sigmas],
+        }
+    }
+
     /// Refuses what no verdict can be made with.
     ///
     /// # Errors

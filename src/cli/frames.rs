@@ -93,7 +93,7 @@ pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
     let mistake = touch_mistake(&robot, &touches, &given, (&fitted, &found.limits));
     let mut findings = findings((&fitted, mistake), &touches, (&found.limits, placement), &subject);
     findings.extend(other_frame(&record.robot.base, (&fitted, &work_name(&touches)), &found.limits, &subject));
-    findings.extend(from_below(robot.exported(), &fitted, &touches, &subject));
+    findings.extend(from_below(robot.exported(), (&fitted, &touches), &found.limits, &subject));
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
     let made = FramesRecord {
         format: FORMAT,

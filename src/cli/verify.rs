@@ -30,9 +30,6 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
     }
 }
 
-/// How far, RMS, points may be from where a robot puts them, m: robots miss by millimetres.
-const FARTHEST_M: f64 = 0.05;
-
 /// A robot model with the fit of the points to it.
 struct Judged {
     robot: Robot,
@@ -58,22 +55,22 @@ impl Judged {
 }
 
 fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
-    let limits = &Limits::default();
-    let device_m = point_sigma(args.point_sigma_m)?;
     let model = judged(args, (&args.urdf, args.compensation.as_deref()), (file, unit))?;
+    let stated = Stated::beside(&args.urdf, &model.robot);
+    let limits = &Stated::limits_of(stated.as_ref());
+    let device_m = point_sigma(args.point_sigma_m, limits)?;
     refuse_mistaken(&model, &args.urdf, file, limits)?;
-    refuse_far(&model, &args.urdf, file)?;
+    refuse_far(&model, &args.urdf, file, limits)?;
     let count = model.points.len();
     say_line!("points    {count} of {}; frame of the device and reflector fitted", file.display());
     say_line!("{}", line("model", &args.urdf, &model));
     let nominal = args.nominal.as_ref().map(|urdf| {
         let nominal = judged(args, (urdf, None), (file, unit))?;
-        refuse_far(&nominal, urdf, file)?;
+        refuse_far(&nominal, urdf, file, limits)?;
         say_line!("{}", line("nominal", urdf, &nominal));
         Ok(nominal)
     });
     let nominal = nominal.transpose()?;
-    let stated = Stated::beside(&args.urdf, &model.robot);
     let expected = stated.as_ref().and_then(|s| Some((s, s.at_points(&model.points, device_m)?)));
     // What the model itself may miss, different in every posture, is no step of the device.
     let may_miss = expected.as_ref().is_some_and(|(_, expected)| model.fit.rms_m <= expected.most_m);
@@ -112,9 +109,9 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
 }
 
 /// As stated; nothing where it is not.
-fn point_sigma(stated: Option<f64>) -> Result<f64> {
+fn point_sigma(stated: Option<f64>, limits: &Limits) -> Result<f64> {
     match stated.unwrap_or(0.0) {
-        sigma if (0.0..FARTHEST_M).contains(&sigma) => Ok(sigma),
+        sigma if (0.0..limits.far_points_m).contains(&sigma) => Ok(sigma),
         sigma => Err(Error::new(
             Code::OptionRange,
             "--point-sigma-m",
@@ -172,8 +169,8 @@ fn refuse_mistaken(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) ->
     Err(contradict((model, urdf), file, &why, "correct the columns of the joints"))
 }
 
-fn refuse_far(model: &Judged, urdf: &Path, file: &Path) -> Result<()> {
-    if model.fit.rms_m <= FARTHEST_M {
+fn refuse_far(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Result<()> {
+    if model.fit.rms_m <= limits.far_points_m {
         return Ok(());
     }
     let why = ": no error of a robot, but another robot or other readings";

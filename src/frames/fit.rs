@@ -16,7 +16,6 @@ use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::linalg::{SymmetricFactor, product};
 use crate::model::robot::Posture;
-use crate::problem::body_bound;
 
 /// Most steps.
 const ROUNDS: usize = 50;
@@ -323,7 +322,8 @@ pub fn fit(robot: &KnownRobot, touches: &Touches, given: &Given, limits: &Limits
         let others = work.converged(&unknowns, &used);
         let beyond = others.as_ref().and_then(|(u, s, solved)| {
             let sigmas = predicted(&work, u, *s, solved, worst)?;
-            (sigmas > bound(&touches.all[worst].seen)).then_some(sigmas)
+            let is_pose = matches!(touches.all[worst].seen, Seen::Pose(_));
+            (sigmas > limits.bounds().of_body(is_pose, false)).then_some(sigmas)
         });
         match (beyond, others) {
             (Some(sigmas), Some(found)) => {
@@ -337,11 +337,6 @@ pub fn fit(robot: &KnownRobot, touches: &Touches, given: &Given, limits: &Limits
         }
     }
     Ok(work.finished(&unknowns, factor, &solved, &without))
-}
-
-/// Length that a normal residual exceeds with a probability of 4e-5.
-fn bound(seen: &Seen) -> f64 {
-    body_bound(matches!(seen, Seen::Pose(_)))
 }
 
 /// Length in sigmas of the difference between a measurement and what the others predict.

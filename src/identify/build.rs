@@ -149,6 +149,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         families,
         restraint: None,
         huber: HUBER,
+        bounds: limits.bounds(),
     };
     let sizes = if problem.tells_displacements().contains(&true) { DISPLACEMENT_SIZES } else { 1 };
     problem.noise.displacement = vec![FIRST_DISPLACEMENT; runs * sizes];

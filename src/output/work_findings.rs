@@ -12,9 +12,6 @@ use crate::frames::{FrameFit, Touches};
 use crate::geom::Pose;
 use crate::model::robot::{Posture, Robot};
 
-/// Places that stand in one plane, m.
-const FLAT_M: f64 = 1e-3;
-
 /// The places are said to stand in the base of the robot, and their frame does not.
 pub fn other_frame(base: &str, (fit, name): (&FrameFit, &str), limits: &Limits, subject: &str) -> Option<FileFinding> {
     let work = fit.work.filter(|_| name == base)?;
@@ -38,11 +35,16 @@ pub fn other_frame(base: &str, (fit, name): (&FrameFit, &str), limits: &Limits, 
 
 /// Places of one plane that were all touched from its negative side: by mirrored coordinates the plane looks the other way, and nothing else
 /// tells.
-pub fn from_below(robot: &Robot, fit: &FrameFit, touches: &Touches, subject: &str) -> Option<FileFinding> {
+pub fn from_below(
+    robot: &Robot,
+    (fit, touches): (&FrameFit, &Touches),
+    limits: &Limits,
+    subject: &str,
+) -> Option<FileFinding> {
     let work_from_base = fit.work?.inverse();
     let places: Vec<Vector3<f64>> = touches.placed().map(|(_, place)| place).collect();
     let first = places.first()?;
-    let is_flat = places.iter().all(|place| (place.z - first.z).abs() < FLAT_M);
+    let is_flat = places.iter().all(|place| (place.z - first.z).abs() < limits.flat_places_m);
     let height = |posture: &Posture| {
         let flange = work_from_base * robot.pose_at(posture, &vec![0.0; posture.readings.len()]);
         flange.translation.z - first.z

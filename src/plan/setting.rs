@@ -5,6 +5,7 @@ use std::iter;
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use super::visibility::seen_markers;
+use crate::assess::Limits;
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
@@ -94,6 +95,7 @@ impl Setting {
             restraint: None,
             // Predictions have no residuals, so that it never acts.
             huber: HUBER,
+            bounds: Limits::default().bounds(),
         };
         Adjustment { problem, state }
     }

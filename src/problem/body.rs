@@ -13,14 +13,6 @@ use crate::geom::{Pose, right_jacobian_se3};
 /// Huber bounds on the normalised length of a residual: the 95 % points of the length of a standard normal vector of 3 and of 6 components.
 const HUBER: [f64; 2] = [2.795, 3.548];
 
-/// Lengths that a standard normal vector of 3 and of 6 components exceeds with a probability of 4e-5, as those do that are left out of an image.
-const BOUND: [f64; 2] = [4.79, 5.52];
-
-/// Length of the residual of a point or a pose, in sigmas, beyond which it is left out.
-pub fn body_bound(is_pose: bool) -> f64 {
-    BOUND[usize::from(is_pose)]
-}
-
 /// What measures bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -175,8 +167,8 @@ pub struct BodyTerms {
     pub residual: Vector6<f64>,
     /// Sums of squares in units of the stated sigmas: position, rotation.
     pub squares: [f64; 2],
-    /// Length of the residual in sigmas, and that which a normal one exceeds with a probability of 4e-5.
-    pub length: [f64; 2],
+    /// Length of the residual in sigmas.
+    pub length: f64,
     /// Huber weight.
     pub weight: f64,
 }
@@ -186,7 +178,7 @@ impl BodyTerms {
     /// residual beyond the bound, `l` sigmas long, is bent by `J' w S^-1 r r' S^-1 J / l^2` less.
     pub fn robust_curvature(&self) -> Matrix6<f64> {
         match self.weight < 1.0 {
-            true => self.pp - self.bp * self.bp.transpose() / (self.weight * self.length[0].powi(2)),
+            true => self.pp - self.bp * self.bp.transpose() / (self.weight * self.length.powi(2)),
             false => self.pp,
         }
     }
@@ -210,15 +202,7 @@ impl BodyMeasurement {
         let information = |k: usize| weight / (sigma[k / 3] * factors[k / 3]).powi(2);
         let w = Matrix6::from_diagonal(&Vector6::from_fn(|k, _| if k < coordinates { information(k) } else { 0.0 }));
         let jw = jacobian.transpose() * w;
-        BodyTerms {
-            cost,
-            pp: jw * jacobian,
-            bp: jw * residual,
-            residual,
-            squares,
-            length: [length, BOUND[kind]],
-            weight,
-        }
+        BodyTerms { cost, pp: jw * jacobian, bp: jw * residual, residual, squares, length, weight }
     }
 
     /// Measured minus predicted, and the derivative of the prediction by its body twist.

@@ -1,6 +1,7 @@
 //! What is given: data, columns, and what is known beforehand.
 
 use super::body::{BodyMeasurement, Instrument};
+use super::bounds::Bounds;
 use super::family::Family;
 use super::image::Image;
 use super::layout::Layout;
@@ -50,6 +51,8 @@ pub struct Problem {
     pub restraint: Option<Restraint>,
     /// Huber bound on the normalised length of a residual.
     pub huber: f64,
+    /// What is left out.
+    pub bounds: Bounds,
 }
 
 /// Huber bound on the normalised length of a residual of an image: the 95 % point of the length of a 2-D standard normal vector.

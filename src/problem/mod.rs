@@ -6,6 +6,7 @@
 mod adjustment;
 mod body;
 mod body_chain;
+mod bounds;
 mod condensed;
 mod equations;
 mod family;
@@ -31,9 +32,8 @@ mod stop;
 
 pub use crate::model::plate_modes::SCALE;
 pub use adjustment::Adjustment;
-pub use body::{
-    BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, InstrumentKind, body_bound, places_body,
-};
+pub use body::{BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, InstrumentKind, places_body};
+pub use bounds::Bounds;
 pub use condensed::{SeenAtStop, by_columns, condensed};
 pub use equations::{E, Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use family::Family;

@@ -2,21 +2,9 @@
 
 use crate::linalg::median;
 use crate::problem::{
-    Adjustment, BodyMeasurement, BodyRejection, Image, ImageRejection, Mismatch, ObservationRejection, TakenFrom,
-    Weighting, predict,
+    Adjustment, BodyMeasurement, BodyRejection, BodySeen, Image, ImageRejection, Mismatch, ObservationRejection,
+    TakenFrom, Weighting, predict,
 };
-
-/// Normalised residual length beyond which an observation is left out (a clean one is so with probability 4e-5).
-const OBSERVATION_BOUND: f64 = 4.5;
-
-/// A rejected observation comes back below this.
-const OBSERVATION_RETURN: f64 = 4.0;
-
-/// Joint error of an image, in robust sigmas per joint, beyond which it does not belong to its readings.
-const IMAGE_BOUND: f64 = 8.0;
-
-/// Smallest robust sigma of a joint that is believed in this test, rad or m.
-const IMAGE_SIGMA_FLOOR: f64 = 1e-4;
 
 /// Re-judges every observation at the estimates; returns how many verdicts changed.
 pub fn reject_observations(adjustment: &mut Adjustment) -> usize {
@@ -32,7 +20,7 @@ pub fn reject_observations(adjustment: &mut Adjustment) -> usize {
             let Some(p) = predict(image, state, &pose, o) else { continue };
             let r = o.uv - p.uv;
             let length = (r.dot(&(o.information * r))).max(0.0).sqrt() / w.pixel_factor;
-            let out = length > if o.rejected.is_some() { OBSERVATION_RETURN } else { OBSERVATION_BOUND };
+            let out = length > problem.bounds.of_observation(o.rejected.is_some());
             if out != o.rejected.is_some() {
                 verdicts.push((i, k, out));
             }
@@ -106,7 +94,7 @@ pub fn reject_stops(adjustment: &mut Adjustment) -> bool {
 }
 
 fn reject_worst(adjustment: &mut Adjustment) -> Option<Taken> {
-    let robot = &adjustment.state.robot;
+    let (robot, bounds) = (&adjustment.state.robot, adjustment.problem.bounds);
     let images = adjustment
         .used()
         .filter_map(|(i, ..)| Some((Taken::Image(i), whole_error(adjustment, &adjustment.taken_from(i))?)));
@@ -119,12 +107,12 @@ fn reject_worst(adjustment: &mut Adjustment) -> Option<Taken> {
     let sigma: Vec<f64> = (0..joints)
         .map(|r| {
             let usual = median(noise.iter().map(|(_, dq)| dq[r].abs())).unwrap_or(0.0);
-            (1.4826 * usual).max(IMAGE_SIGMA_FLOOR)
+            (1.4826 * usual).max(bounds.joint_sigma)
         })
         .collect();
     let score = |dq: &[f64]| (dq.iter().zip(&sigma).map(|(q, s)| (q / s).powi(2)).sum::<f64>() / joints as f64).sqrt();
     let (worst, dq) = noise.iter().max_by(|a, b| score(a.1).total_cmp(&score(b.1)))?;
-    if score(dq) <= IMAGE_BOUND {
+    if score(dq) <= bounds.joint_error {
         return None;
     }
     let (joint, error) =
@@ -152,8 +140,8 @@ pub fn reject_bodies(adjustment: &mut Adjustment) -> usize {
             return None;
         }
         let predicted = state.instrument_from_body(measured, adjustment.body_taken_from(k))?;
-        let [sigmas, bound] = measured.linearise(&predicted, problem.body_factors(measured)).length;
-        let is_out = sigmas > if was_out { bound * OBSERVATION_RETURN / OBSERVATION_BOUND } else { bound };
+        let sigmas = measured.linearise(&predicted, problem.body_factors(measured)).length;
+        let is_out = sigmas > problem.bounds.of_body(matches!(measured.seen, BodySeen::Pose(_)), was_out);
         (is_out || was_out).then_some((k, is_out != was_out, is_out.then_some(BodyRejection::Residual { sigmas })))
     };
     let verdicts: Vec<_> = problem.body_measurements.iter().enumerate().filter_map(verdict).collect();

@@ -323,7 +323,7 @@ fn places_of_a_plane_that_were_touched_from_below_are_told() {
         }
         let given = Given { tool: Some(tool), ..Given::default() };
         let found = fit(&robot, &touches, &given, &Limits::default()).unwrap();
-        let told = from_below(robot.exported(), &found, &touches, "touches");
+        let told = from_below(robot.exported(), (&found, &touches), &Limits::default(), "touches");
         let code = told.map(|finding| (finding.code, finding.weight));
         assert_eq!(code, mirrored.then_some((Code::TouchedFromBelow, Weight::Note)));
     }

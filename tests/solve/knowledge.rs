@@ -429,6 +429,7 @@ fn every_doubt_is_a_finding_with_a_code() {
 fn images_off_the_robot_alone_are_no_robot() {
     let mut off = world(2, 2e-5);
     off.stops.iter_mut().for_each(|s| s.readings = None);
+    let place = format!("joints.csv of {}", off.name);
     let error = identify(chain(), &[off], &Options::default()).unwrap_err();
     assert_eq!((error.code, error.place.as_str()), (Code::ReadingsMissing, place.as_str()));
     assert!(error.what.contains("40"), "{error}");
@@ -468,7 +469,6 @@ fn blurred_images_of_a_moving_robot_are_named() {
     }
     let solution =
         identify(chain(), &[moving.clone()], &Options { model: RobotModel::Rigid, ..Options::default() }).unwrap();
-    let place = format!("joints.csv of {}", off.name);
     let noise = solution.findings.iter().find(|f| f.code() == Code::JointNoiseLarge).unwrap();
     for k in [7, 19] {
         let image = Subject::Image(moving.stops[k].image.clone());

@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Vector2, Vector3, Vector6};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
+use robotcal::assess::Limits;
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
@@ -290,6 +291,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
             families: Vec::new(),
             restraint: None,
             huber: 2.45,
+            bounds: Limits::default().bounds(),
         },
         state,
     )
