@@ -204,6 +204,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("output/camera_formats/distortion.rs ACROSS", "grid of a fit"),
     ("output/camera_formats/mod.rs SAME_PX", "rounding of a lens"),
     ("output/canvas.rs ADVANCE", "size of a letter"),
+    ("output/dot_font.rs ADVANCE", "size of a letter"),
     ("output/compensation.rs GRAVITY", "constant of nature"),
     ("output/compensation_read.rs ROUNDED", "rounding of a file"),
     ("output/controller_files.rs POSTURES", "samples of a check"),
