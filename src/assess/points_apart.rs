@@ -27,7 +27,7 @@ pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], limits: &Limits) -> O
         let kept: Vec<MeasuredPoint> =
             points.iter().enumerate().filter(|(k, _)| !odd.contains(k)).map(|(_, p)| p.clone()).collect();
         let without = fit_points(robot, &kept)?;
-        let usual = median(&without.residuals_m.iter().map(Vector3::norm).collect::<Vec<_>>())?;
+        let usual = median(without.residuals_m.iter().map(Vector3::norm).collect::<Vec<_>>())?;
         let bound = (limits.set_aside_factor * usual).max(limits.displaced_m);
         let off_m: Vec<f64> = points.iter().map(|p| without.residual_m(robot, p).norm()).collect();
         let found: Vec<usize> = (0..points.len()).filter(|k| off_m[*k] > bound).collect();

@@ -56,7 +56,7 @@ fn split(values: &[f64], fewest: usize) -> Option<Split> {
     let cuts = fewest..=n.checked_sub(fewest)?;
     let best = cuts.map(|k| (squares(&order[..k]) + squares(&order[k..]), k)).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let (squares, k) = best;
-    let median_of = |heap: &[usize]| median(&heap.iter().map(|&i| values[i]).collect::<Vec<_>>());
+    let median_of = |heap: &[usize]| median(heap.iter().map(|&i| values[i]).collect::<Vec<_>>());
     let distance = median_of(&order[k..])? - median_of(&order[..k])?;
     let mut smaller = if 2 * k <= n { order[..k].to_vec() } else { order[k..].to_vec() };
     smaller.sort_unstable();

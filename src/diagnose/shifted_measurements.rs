@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
-use crate::assess::{Limits, best_run, median};
+use crate::assess::{Limits, best_run};
 use crate::error::Code;
+use crate::linalg::median;
 use crate::problem::{
     Adjustment, BodyMeasurement, BodyRejection, BodySeen, InstrumentKind, Problem, TakenFrom, stop_name,
 };
@@ -70,7 +71,7 @@ impl Group<'_> {
     fn shifted(&self, setting: &CheckContext) -> Option<ShiftedMeasurements> {
         let problem = &self.adjustment.problem;
         let used = (0..self.group.len()).filter(|row| self.measured(*row).rejected.is_none());
-        let usual = median(&used.filter_map(|row| self.misfit(row, self.measured(row).stop)).collect::<Vec<f64>>())?;
+        let usual = median(used.filter_map(|row| self.misfit(row, self.measured(row).stop)))?;
         let own: Vec<usize> = (0..self.group.len()).map(|row| self.measured(row).stop).collect();
         let all: Vec<usize> = (0..problem.stops.len()).collect();
         let ways = [&all, &own].into_iter().flat_map(|order| [true, false].map(|below| (order, below)));

@@ -20,7 +20,7 @@ pub(super) fn check(
     setting: &CheckContext,
 ) -> Option<FlangeUndetermined> {
     let covered = uncertainty.workspace.iter().filter(|w| w.covered);
-    let usual = median(&covered.map(|w| w.sigma_m).collect::<Vec<f64>>()).map(|m| 1e3 * m);
+    let usual = median(covered.map(|w| w.sigma_m).collect::<Vec<f64>>()).map(|m| 1e3 * m);
     let nominal_mm = accuracy.nominal.rms_mm;
     let found = usual.filter(|mm| *mm > nominal_mm.max(setting.limits.flange_sigma_mm));
     found.map(|sigma_mm| FlangeUndetermined { sigma_mm, nominal_mm })

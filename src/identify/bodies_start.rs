@@ -143,7 +143,7 @@ fn start_sockets(
     name_mistake(adjustment, &all, limits, |robot, seen| {
         let held: Vec<(usize, Pose)> = seen.iter().map(|s| (s.instrument, robot.base_from_tip(&s.readings))).collect();
         let held = of_postures(&held);
-        in_sockets(&held, most_out).and_then(|found| median(&found.misfits(&held))).unwrap_or(f64::INFINITY)
+        in_sockets(&held, most_out).and_then(|found| median(found.misfits(&held))).unwrap_or(f64::INFINITY)
     })?;
     // What sat in another socket than is said would spoil the noise of all before it is left out by its residual.
     let misfits = found.misfits(&held);
@@ -179,7 +179,7 @@ impl InSockets {
             touched.entry(*socket).or_default().push(tip.transform(&self.body));
         }
         let along = |all: &[Vector3<f64>], axis: usize| {
-            median(&all.iter().map(|at| at[axis]).collect::<Vec<f64>>()).unwrap_or_default()
+            median(all.iter().map(|at| at[axis]).collect::<Vec<f64>>()).unwrap_or_default()
         };
         let middle = |all: Vec<Vector3<f64>>| Vector3::from_fn(|axis, _| along(&all, axis));
         Self { body: self.body, places: touched.into_iter().map(|(socket, all)| (socket, middle(all))).collect() }

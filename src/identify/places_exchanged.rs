@@ -41,7 +41,7 @@ impl Touched {
         let missed = distances(&points, &placed);
         let of_place = |place: usize| {
             let own = missed.iter().zip(&self.place_of).filter(|(_, of)| **of == place);
-            median(&own.map(|(distance, _)| *distance).collect::<Vec<f64>>()).unwrap_or_default()
+            median(own.map(|(distance, _)| *distance).collect::<Vec<f64>>()).unwrap_or_default()
         };
         (0..self.places.len()).map(of_place).fold(0.0, f64::max)
     }

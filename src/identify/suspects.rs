@@ -28,7 +28,7 @@ pub(super) struct Suspects<'a> {
 }
 
 /// Images by which a mistake is seen to explain the misfit of all: a sample of a median.
-const ENOUGH: usize = 100;
+pub(super) const ENOUGH: usize = 100;
 
 /// Those of `n` images by which a mistake is seen to explain the misfit of all.
 pub(super) fn some_of(n: usize) -> impl Iterator<Item = usize> {

@@ -23,7 +23,7 @@ mod tests {
     fn the_larger_of_two_middle_values_and_nothing_of_nothing() {
         assert_eq!(median([3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median([4.0, 3.0, 1.0, 2.0]), Some(3.0));
-        assert_eq!(median(&[f64::NAN, 2.0, 1.0]), Some(2.0));
+        assert_eq!(median([f64::NAN, 2.0, 1.0]), Some(2.0));
         assert_eq!(median(Vec::<f64>::new()), None);
         assert_eq!(median_by([3, 1, 2, 4], i32::cmp), Some(3));
     }

@@ -77,7 +77,7 @@ impl PosesRecord {
 
 /// How well a pose is usually known: medians of the standard deviations of position, m, and direction, rad.
 pub fn usual(known: &[PoseSigma]) -> Option<[f64; 2]> {
-    let middle = |of: fn(&PoseSigma) -> f64| median(&known.iter().map(of).collect::<Vec<_>>());
+    let middle = |of: fn(&PoseSigma) -> f64| median(known.iter().map(of).collect::<Vec<_>>());
     Some([middle(|s| s.position_m)?, middle(|s| s.rotation_rad)?])
 }
 

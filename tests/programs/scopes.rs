@@ -123,7 +123,7 @@ fn a_data_list_of_krl_belongs_to_its_program() {
     let mut cell = Cell::kuka(135);
     let (a, b) = (cell.readings(), cell.readings());
     let files = |name: &str, q: &[f64], z: f64| {
-        let pose = crate::not_told::krl(&cell, q);
+        let pose = crate::programs_support::text::krl_pose(&cell, q);
         [
             (
                 format!("{name}.src"),
