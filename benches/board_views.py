@@ -18,6 +18,8 @@ import tempfile
 import cv2
 import numpy as np
 
+import made_with
+
 FOUND_PX = 2.0
 PLATES = {
     "chessboard": "columns = 9\nrows = 6\npitch_m = 0.025",
@@ -93,6 +95,7 @@ def tally(paths, found):
 
 
 def main():
+    made_with.say(sys.argv[2] if len(sys.argv) > 2 else None)
     cv2.setNumThreads(1)
     print("| board | view | detector | views with the board | found | share | wrong | rms px |\n|---|---|---|---|---|---|---|---|")
     detectors = {"chessboard": chessboard, "charuco": charuco(), "circle-grid": circle_grid}

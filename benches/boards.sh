@@ -16,4 +16,5 @@ if [ -z "${BINARY:-}" ]; then
   (cd "$here/.." && cargo build --release -q)
   BINARY="$here/../target/release/robotcal"
 fi
+"$here/made_with.sh" "$BINARY"
 exec "$python" "$here/boards.py" "$BINARY" "$@"

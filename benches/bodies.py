@@ -17,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+import made_with
+
 ROBOTCAL = os.environ.get("ROBOTCAL", "target/release/robotcal")
 DRAWS = int(os.environ.get("DRAWS", "5"))
 
@@ -191,6 +193,7 @@ def images_and_points(real, work, count=10):
 
 
 def main():
+    made_with.say(ROBOTCAL)
     real = Path(sys.argv[1])
     with tempfile.TemporaryDirectory() as work:
         for name in ("mukca-panda_1", "mukca-panda_3", "mukca-dinova_1"):

@@ -16,6 +16,8 @@ import sys
 
 import numpy as np
 
+import made_with
+
 K = np.array([[1108.52, 0, 647.17], [0, 1108.97, 507.4], [0, 0, 1]])
 SIZE = (1280, 1024)
 LENSES = {
@@ -139,6 +141,7 @@ class Mrcal:
 
 def main():
     program, folder = sys.argv[1:3]
+    made_with.say(program)
     os.makedirs(folder, exist_ok=True)
     worst, too_far = 0.0, False
     for judge in [{"opencv": OpenCv, "mrcal": Mrcal}[n]() for n in sys.argv[3:] or ["opencv", "mrcal"]]:

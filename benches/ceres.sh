@@ -35,6 +35,7 @@ pair() { # folder, name, mode of ours, arguments of rc_ceres
     'BEGIN {printf "| %s | %.3f | %d | %.3f | %d | %.1f | %.1e | %d |\n", n, t, j, u, i, t / u, (cu - ct) / ct, m}'
 }
 
+benches/made_with.sh
 echo "| problem | Ceres s | steps | robotcal s | steps | ratio | relative cost | MB |"
 echo "|---|---|---|---|---|---|---|---|"
 for n in "${images[@]}"; do

@@ -63,6 +63,7 @@ reached() { # series, scale, mode, start, cost of the optimum
   echo "$n"
 }
 
+benches/made_with.sh
 echo "| series | start error | exact, guess | exact, images | joint, guess | joint, images |"
 echo "|---|---|---|---|---|---|"
 for name in plain weak; do

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+import made_with
+from bodies import ROBOTCAL
 from worlds import HEIGHT, WIDTH, Board, Camera, World, carried, looking, pose, turn
 
 STOPS = 40
@@ -160,6 +162,7 @@ def world(effect, seed, folder):
 
 
 def main():
+    made_with.say(ROBOTCAL)
     seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 6
     print("| effect | good | error over stated sigma of these, RMS | at most | found |\n|---|---|---|---|---|")
     for effect in sys.argv[2:] or EFFECTS:

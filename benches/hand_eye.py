@@ -20,6 +20,8 @@ import tomllib
 import cv2
 import numpy as np
 
+import made_with
+
 SOLVERS = {
     "Tsai": cv2.CALIB_HAND_EYE_TSAI,
     "Park": cv2.CALIB_HAND_EYE_PARK,
@@ -151,6 +153,7 @@ def numbers_of(file):
 
 def main():
     robotcal, series = sys.argv[1], pathlib.Path(sys.argv[2])
+    made_with.say(robotcal)
     folds = int(sys.argv[3]) if len(sys.argv) > 3 else 5
     flange = controller(series)
     errors = {}

@@ -18,6 +18,8 @@ import tomllib
 
 import numpy as np
 
+import made_with
+
 try:
     import cv2
     cv2.setNumThreads(1)
@@ -182,6 +184,7 @@ def project(lens, p, x):
 
 def main():
     program, work, folder = sys.argv[1:4]
+    made_with.say(program)
     print("| series | program | held out, px | fx | s |\n|---|---|---|---|---|", flush=True)
     for name in sys.argv[4:]:
         series = os.path.join(folder, name)

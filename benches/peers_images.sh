@@ -14,6 +14,7 @@ export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 RAYON_NUM_THREADS=1 CARGO_TERM_C
 bench=$(cargo bench --bench detect --no-run 2>&1 | sed -n 's/.*Executable.*(\(.*\)).*/\1/p')
 work=$(mktemp -d); trap 'rm -rf "$work"' EXIT
 
+benches/made_with.sh
 for size in "" --mp5; do
   images="$work/pictures$size"
   "$python" "$peers/images/render.py" "$images" "$pictures" $size > /dev/null

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+import made_with
 from bodies import ROBOTCAL, rotation, write
 
 ROBOTS = {
@@ -478,6 +479,7 @@ def cells(seed, folder):
 
 
 def main():
+    made_with.say(ROBOTCAL)
     first, last = (int(v) for v in sys.argv[1:3]) if len(sys.argv) > 2 else (1, 40)
     for kind in (cameras, several, cells):
         ratios = []

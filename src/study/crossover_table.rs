@@ -9,6 +9,7 @@ use crate::assess::Ratio;
 use crate::identify::Estimator;
 use crate::output::comparison::ratio_text;
 use crate::output::report::page::page;
+use crate::study::made_with::made_with;
 
 /// How to read the estimators, for both reports.
 fn legend() -> Vec<String> {
@@ -87,7 +88,11 @@ fn study_setup(study: &Study) -> String {
 
 /// The study as Markdown.
 pub fn study_markdown(study: &Study, command: &str) -> String {
-    let mut out = format!("# Two-step calibration against the joint fit\n\n`{command}`\n\n{}\n\n", study_setup(study));
+    let mut out = format!(
+        "# Two-step calibration against the joint fit\n\n`{command}` ({})\n\n{}\n\n",
+        made_with(),
+        study_setup(study)
+    );
     for line in study_verdict(study) {
         let _ = writeln!(out, "- {line}");
     }
@@ -191,7 +196,7 @@ pub fn study_html(study: &Study, command: &str) -> String {
         .collect();
     let body = html! {
         h1 { "Two-step calibration against the joint fit" }
-        p { code { (command) } }
+        p { code { (command) } " (" (made_with()) ")" }
         p { (study_setup(study)) }
         ul { @for line in study_verdict(study) { li { (line) } } }
         p { @for (line, colour) in legend().iter().zip(COLOURS) { span style=(format!("color:{colour}")) { "\u{25A0} " } (line) br; } }

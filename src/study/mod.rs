@@ -3,6 +3,7 @@
 mod crossover;
 mod crossover_table;
 pub mod image_stage;
+mod made_with;
 mod monte_carlo;
 mod monte_carlo_table;
 mod planning;
@@ -11,6 +12,7 @@ mod simulated;
 
 pub use crossover::{Study, StudyCell, StudyRequest, study};
 pub use crossover_table::{study_html, study_markdown, study_verdict};
+pub use made_with::made_with;
 pub use monte_carlo::{
     BLOCKS, BlockResult, ErrorWithCovariance, MonteCarloCell, MonteCarloRequest, flange_error, monte_carlo,
 };

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::study::made_with::made_with;
 use crate::study::{BLOCKS, MonteCarloCell};
 
 /// Markdown with one table of normalised errors and one of the joint noise; `command` makes it.
@@ -11,7 +12,7 @@ pub fn monte_carlo_markdown(cells: &[MonteCarloCell], command: &str) -> String {
     let failed: usize = cells.iter().map(|c| c.failed).sum();
     let _ = write!(
         out,
-        "Made by `{command}`: {worlds} simulated series identified from nothing with the full robot model, {failed} without a solution. \
+        "Made by `{command}` ({}): {worlds} simulated series identified from nothing with the full robot model, {failed} without a solution. \
          The true errors of robot, plate and markers are drawn from the priors of the estimator; images of 48 circles with a noise of 0.05 px.\n\n\
          ## Normalised error squared\n\n\
          Mean of `e' C^-1 e / n` over the worlds, for the error `e` of a block of `n` parameters with its stated covariance `C`. It is 1 \
@@ -21,7 +22,8 @@ pub fn monte_carlo_markdown(cells: &[MonteCarloCell], command: &str) -> String {
          ones. \"robot\" takes `C` half-way between estimate and truth, where the tangent is parallel to the error. It contains what the \
          uncertainty of the estimated joint noise adds, which also widens the interval (it is common to all parameters of a world); the second column takes the noise that was put in, and judges the covariance \
          alone. The third takes `C` at the estimate, as solution.json states it. What it misses is the curvature, not the size of any parameter (\"single \
-         parameters\": mean of `e^2 / sigma^2` of each by itself) and not the flange.\n\n"
+         parameters\": mean of `e^2 / sigma^2` of each by itself) and not the flange.\n\n",
+        made_with()
     );
     let _ = writeln!(out, "| joint noise, mrad | worlds | {} |", BLOCKS.join(" | "));
     let _ = writeln!(out, "|---|---|{}", "---|".repeat(BLOCKS.len()));

@@ -1,18 +1,20 @@
 //! The planning study as Markdown.
 
 use super::planning::{PlanStudy, PlanStudyRequest};
+use crate::study::made_with::made_with;
 
 /// A study as a table in Markdown.
 pub fn study_table(robot: &str, request: &PlanStudyRequest, study: &PlanStudy) -> String {
     let [found, predicted, random, random_predicted] = study.overall_m().map(|m| 1e3 * m);
     let mut text = format!(
-        "## {robot}: {} planned images against {} random ones, {} worlds\n\n\
+        "## {robot}: {} planned images against {} random ones, {} worlds\n\nMade with {}.\n\n\
          | | found, mm | predicted, mm | predicted / found |\n|---|---|---|---|\n\
          | {} planned | {found:.4} | {predicted:.4} | {:.3} |\n\
          | {} random | {random:.4} | {random_predicted:.4} | {:.3} |\n\n",
         request.planned,
         request.random,
         study.rows.len(),
+        made_with(),
         request.planned,
         predicted / found,
         request.random,

@@ -7,6 +7,7 @@ use crate::outputs_support::truth_frame::{
     Alignment, Judged, PLAIN, Setup, judged, least_eigenvalue, pose_row, result, template, world,
 };
 use crate::outputs_support::{context, robot, series, series_with_bar_in_two_places};
+use crate::robots::made_with;
 use nalgebra::{DMatrix, Matrix6, Vector3};
 use rayon::prelude::*;
 use robotcal::geom::{Pose, adjoint, skew};
@@ -389,6 +390,7 @@ fn poses_and_markers_of_the_shipped_dataset_are_as_uncertain_as_stated() {
 #[test]
 #[ignore = "2400 worlds, minutes"]
 fn study_of_the_plate_frame() {
+    println!("{}", made_with());
     let worlds: u64 = std::env::var("WORLDS").map_or(200, |w| w.parse().unwrap());
     println!(
         "| places | distance measured | image noise, px | worlds | poses | not positive definite | poses, shape | poses, with scale | markers, shape | markers, with scale |"

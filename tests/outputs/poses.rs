@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::outputs_support::truth_frame::{Alignment, least_eigenvalue};
 use crate::outputs_support::{context, robot};
+use crate::robots::made_with;
 use nalgebra::{Matrix6, Vector3};
 use rayon::prelude::*;
 use robotcal::Code;
@@ -241,6 +242,7 @@ fn judged(made: &SimulatedSeries) -> Option<(f64, [f64; 2])> {
 #[test]
 #[ignore = "many minutes; its figures stand in reports/poses.md; WORLDS worlds a line"]
 fn study_of_stand_alone_poses() {
+    println!("{}", made_with());
     let worlds: u64 = std::env::var("WORLDS").map_or(20, |n| n.parse().unwrap());
     println!(
         "| markers | images | image noise px | plate | worlds | normalised error squared | mm per axis | arcmin per axis |\n|---|---|---|---|---|---|---|---|"

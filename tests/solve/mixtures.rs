@@ -13,6 +13,7 @@ use robotcal::solve::Spread;
 use crate::cameras::{JOINT_SIGMA, Seen, Taken, normalised, plate, seen_at, solved, solved_with};
 use crate::measured_worlds::{stop, with_ball_at};
 use crate::outputs_support::{robot, scene};
+use crate::robots::made_with;
 use crate::support::small::Dice;
 
 const STOPS: usize = 30;
@@ -205,6 +206,7 @@ fn a_tracker_and_a_plate_that_contradict_each_other_are_named_once() {
 #[test]
 #[ignore = "minutes: 200 worlds of each mixture of two kinds"]
 fn study_of_mixtures() {
+    println!("{}", made_with());
     let worlds: usize = std::env::var("WORLDS").ok().and_then(|w| w.parse().ok()).unwrap_or(200);
     println!(
         "| mixture | worlds | joint errors, noise as put in | noise as found | size of the noise |\n|---|---|---|---|---|"

@@ -37,3 +37,10 @@ pub fn shared(folder: &str) -> PathBuf {
     assert!(path.is_dir(), "{} is not there", path.display());
     path
 }
+
+/// What a study is made with, for the head of its table.
+pub fn made_with() -> String {
+    let git = |args: &[&str]| std::process::Command::new("git").current_dir(repo("")).args(args).output().ok();
+    let commit = git(&["describe", "--always", "--dirty", "--exclude=*"]).map(|o| String::from_utf8(o.stdout).unwrap());
+    format!("Made with robotcal {}, commit {}.\n", env!("CARGO_PKG_VERSION"), commit.unwrap_or_default().trim())
+}

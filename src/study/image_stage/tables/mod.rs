@@ -10,6 +10,8 @@ mod precision_plot;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use crate::study::made_with::made_with;
+
 pub use bias::bias_section;
 pub use identity::identity_section;
 pub use precision::precision_section;
@@ -48,7 +50,7 @@ pub const REPORT: &str = "image-stage.md";
 
 /// The report and its plots: file name -> bytes. `command` makes it.
 pub fn image_study_files(sections: &[Section], command: &str) -> BTreeMap<String, Vec<u8>> {
-    let mut text = format!("# The image stage on rendered pictures\n\nMade by `{command}`.\n");
+    let mut text = format!("# The image stage on rendered pictures\n\nMade by `{command}` ({}).\n", made_with());
     let mut files = BTreeMap::new();
     for section in sections {
         let _ = write!(text, "\n## {}\n\n", section.title);
