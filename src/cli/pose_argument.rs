@@ -42,3 +42,22 @@ pub(super) fn pose_or_file(flag: &str, text: &str) -> Result<Pose> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_is_three_or_six_numbers_everywhere() {
+        let place = Pose::from_xyz_rpy([0.6, 0.0, -0.1], [0.0; 3]);
+        for text in ["0.6,0,-0.1", "0.6, 0, -0.1, 0, 0, 0"] {
+            let (turn, way) = pose_or_file("--plate-pose", text).unwrap().distance(&place);
+            assert!(turn < 1e-12 && way < 1e-12, "{text}");
+        }
+        let turned = pose_or_file("--plate-pose", "0,0,0,0,0,90").unwrap();
+        assert!((turned.distance(&Pose::identity()).0 - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+        for text in ["", "0.6", "0.6,0", "0.6,0,0,1", "a,b,c", "0.6,0,inf", "0,0,0,0,0,0,0"] {
+            assert_eq!(pose_or_file("--plate-pose", text).unwrap_err().code, Code::OptionRange, "{text}");
+        }
+    }
+}

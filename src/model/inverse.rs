@@ -182,3 +182,34 @@ pub fn solve(
         solve_from(robot, limits, base_from_tip, &start)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_angle_turns_towards_another_as_far_as_its_limits_allow() {
+        let limits = (-6.0, 6.0);
+        for (near, beyond, wanted) in [
+            (0.2, &[][..], 1.0),
+            (6.0, &[], 1.0),
+            (6.0, &[-1.0, 1.0], 1.0),
+            (-5.0, &[], 1.0 - TAU),
+            (-12.0, &[], 1.0),
+            (-12.0, &[-1.0, 1.0], 1.0 - TAU),
+        ] {
+            assert!((turned(1.0, near, limits, beyond) - wanted).abs() < 1e-12, "{near} {beyond:?}");
+        }
+    }
+
+    #[test]
+    fn a_full_turn_makes_another_posture_where_it_is_asked_for() {
+        let kinds = [JointKind::Revolute, JointKind::Prismatic];
+        let found = [vec![0.1, 0.0], vec![0.1 + TAU, 0.0], vec![0.1, TAU], vec![0.1 + 0.5 * SAME_READING, 0.0]];
+        for (turns, count) in [(FullTurns::Apart, 3), (FullTurns::Alike, 2)] {
+            let mut all = Vec::new();
+            found.iter().for_each(|q| turns.add(q.clone(), &mut all, &kinds));
+            assert_eq!(all.len(), count, "{turns:?}");
+        }
+    }
+}
