@@ -118,7 +118,7 @@ fn a_lens_that_brown_cannot_fit_is_fitted_to_the_noise() {
             _ => {}
         }
     }
-    let [known, unknown] = [known, unknown].map(|v| robotcal::assess::median(&v).unwrap());
+    let [known, unknown] = [known, unknown].map(|v| robotcal::linalg::median(&v).unwrap());
     println!("map: {known:.4} px where there are data, {unknown:.4} px where there are none");
     assert!(unknown > 5.0 * known && unknown > 0.1 && known < 0.05, "{known} {unknown}");
     // Directions that the formula says are not in the field.

@@ -1,9 +1,10 @@
 //! Robots with and without errors beyond rigid geometry: the extended model helps where they are, and costs nothing where they are not.
 
 use crate::robots::kr6;
-use robotcal::assess::{flange_error_m, median};
+use robotcal::assess::flange_error_m;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Selection, StatedPrior, identify};
+use robotcal::linalg::median;
 use robotcal::problem::MeasuredSeries;
 use robotcal::problem::OriginPrior;
 use robotcal::series::{Plate, PlateKind};
