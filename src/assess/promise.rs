@@ -31,6 +31,10 @@ pub struct FlangeErrors {
     /// How far each of them may be off; absent in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intervals: Option<FlangeIntervals>,
+    /// By how much of every length the size of the plate is in doubt, which none of these numbers has in it: relative, the largest of all plates;
+    /// none where it is not, and in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub without_size_doubt: Option<f64>,
 }
 
 /// 95 % intervals of the expected errors, by the covariance of the model, m: how large the error is that this one arm has in truth.
@@ -86,6 +90,7 @@ impl FlangeErrors {
                 alone_m: alone_lacks.as_ref().map(|lacking| interval(&|k| -lacking[k])),
                 model_m: interval(&|_| Vector3::zeros()),
             }),
+            without_size_doubt: None,
         })
     }
 }

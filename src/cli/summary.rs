@@ -110,6 +110,12 @@ fn flange(r: &SolutionRecord) -> Vec<String> {
     if r.beyond_urdf() {
         lines.push(row("with compensation.toml", e.model_m, i.map(|i| i.model_m)));
     }
+    lines.extend(e.without_size_doubt.map(|doubt| {
+        format!(
+            "          without the size of the plate, in doubt by {:.2} %: every length is off by as much if it is",
+            100.0 * doubt
+        )
+    }));
     lines
 }
 

@@ -38,6 +38,9 @@ pub enum DoubtedSize {
         off: f64,
         /// Prior sigma of it.
         tolerance: f64,
+        /// By how much it is longer along x and along y than its file says, each with its standard deviation, as far as the links of the robot
+        /// tell its size.
+        along: Option<[(f64, f64); 2]>,
         /// As above.
         on_rail: bool,
     },
@@ -69,10 +72,23 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
             && let Some((off, tolerance)) = x_y_scale(problem, state, k)
             && off.abs() > limits.plate_aspect_sigmas * tolerance
         {
-            doubts.push(DoubtedSize::Uneven { off, tolerance, on_rail });
+            let along = told.or_else(|| released.fitted()).map(|told| {
+                let sigma = told.sigma.hypot(0.5 * tolerance);
+                [0.5 * off, -0.5 * off].map(|half| (told.off + half, sigma))
+            });
+            doubts.push(DoubtedSize::Uneven { off, tolerance, along, on_rail });
         }
     }
     doubts
+}
+
+impl DoubtedSize {
+    /// Relative size of what is in doubt.
+    pub const fn relative(&self) -> f64 {
+        match self {
+            Self::Contradicted { off, .. } | Self::Uneven { off, .. } => off.abs(),
+        }
+    }
 }
 
 impl Kind for DoubtedSize {
@@ -97,8 +113,11 @@ impl Kind for DoubtedSize {
     fn quantities(&self) -> Vec<Quantity> {
         match *self {
             Self::Contradicted { off, sigma, .. } => vec![Quantity::new("relative_size", off, "1").with_sigma(sigma)],
-            Self::Uneven { off, tolerance, .. } => {
-                vec![Quantity::new("relative_x_y_scale", off, "1"), Quantity::new("tolerance", tolerance, "1")]
+            Self::Uneven { off, tolerance, along, .. } => {
+                let all = [Quantity::new("relative_x_y_scale", off, "1"), Quantity::new("tolerance", tolerance, "1")];
+                let along = along.into_iter().flatten().zip(["stretch_x", "stretch_y"]);
+                let along = along.map(|((size, sigma), name)| Quantity::new(name, size, "1").with_sigma(sigma));
+                all.into_iter().chain(along).collect()
             }
         }
     }
@@ -116,9 +135,15 @@ impl Kind for DoubtedSize {
                 if *off > 0.0 { "larger" } else { "smaller" },
                 if *measured { "[scale]" } else { "its file" },
             ),
-            Self::Uneven { off, .. } => format!(
-                "its rows and columns differ in scale by {:.2} %, so it was not made to size, and all lengths of the robot hang on its size",
-                100.0 * off.abs()
+            Self::Uneven { off, along, .. } => format!(
+                "its rows and columns differ in scale by {:.2} %{}, so it was not made to size, and all lengths of the robot hang on its size",
+                100.0 * off.abs(),
+                along.map_or_else(String::new, |[(x, sigma), (y, _)]| format!(
+                    " (by the links of the robot it is {:+.2} % along x and {:+.2} % along y, +- {:.2} %)",
+                    100.0 * x,
+                    100.0 * y,
+                    100.0 * sigma
+                ))
             ),
         }
     }

@@ -15,7 +15,7 @@ use super::stated::camera_starts;
 use super::two_stage::PoseStage;
 use super::unpredicted::nothing_held_out;
 use crate::assess::{Limits, hold_out, hold_out_bodies, judge, refitted_near};
-use crate::diagnose::{CheckContext, Diagnosis, StatedNoise};
+use crate::diagnose::{CheckContext, Diagnosis, Finding, StatedNoise};
 use crate::error::{Code, Error, Result};
 use crate::fit::{Fit, FreePoses};
 use crate::problem::MeasuredSeries;
@@ -168,12 +168,15 @@ impl JointFit {
             false => (fit, None, held_out),
         };
         let estimated = noise == JointNoise::Estimated && joint.is_none();
-        let uncertainty = {
+        let mut uncertainty = {
             let _stage = stage("uncertainty");
             judge(&mut fit, estimated, before, limits)
         };
         diagnosis.after_uncertainty(&uncertainty, &accuracy);
         let findings = diagnosis.findings();
+        if let Some(flange) = &mut uncertainty.flange {
+            flange.without_size_doubt = doubt_of_size(&findings);
+        }
         Ok(Solution {
             options,
             estimator,
@@ -281,6 +284,15 @@ fn of_images_alone() -> Error {
     let what =
         "a two-step calibration is made of camera poses, and these series have measurements of trackers or contacts";
     Error::new(Code::OptionConflict, "--two-stage", what, "leave it out, or give series of images alone")
+}
+
+/// By how much the size of a plate is in doubt, relative; that of the plate of which most is.
+fn doubt_of_size(findings: &[Finding]) -> Option<f64> {
+    let of = |finding: &Finding| match finding {
+        Finding::DoubtedSize(doubt) => Some(doubt.relative()),
+        _ => None,
+    };
+    findings.iter().filter_map(of).max_by(f64::total_cmp)
 }
 
 /// Without images of the robot there is no robot to fit.

@@ -3,7 +3,7 @@
 use crate::robots::kr6;
 use nalgebra::Vector3;
 use robotcal::Code;
-use robotcal::diagnose::Finding;
+use robotcal::diagnose::{DoubtedSize, Finding};
 use robotcal::identify::{Estimator, Options, RobotModel, Solution, identify};
 use robotcal::model::plate_modes::DOT_GAIN;
 use robotcal::problem::{MeasuredSeries, SCALE};
@@ -83,6 +83,25 @@ fn a_plate_that_a_printer_stretched_is_doubted_and_a_measured_distance_mends_it_
         assert!((stretch(&measured, 0, 7) - (1.0 / 1.004 - 1.0)).abs() < 3e-4, "{bar:?}: {}", stretch(&measured, 0, 7));
         assert!(stretch(&measured, 0, 40).abs() < 3e-4, "{bar:?}: {}", stretch(&measured, 0, 40));
     }
+}
+
+#[test]
+fn a_stretch_is_told_along_its_axis_and_stated_errors_are_without_it() {
+    for (x, y) in [(1.003, 1.0), (1.0, 1.003)] {
+        let wrong = stated(x, y, None);
+        let along = wrong.findings.iter().find_map(|f| match f {
+            Finding::DoubtedSize(DoubtedSize::Uneven { along, .. }) => *along,
+            _ => None,
+        });
+        let along = along.unwrap_or_else(|| panic!("{:?}", wrong.findings));
+        for ((found, sigma), factor) in along.into_iter().zip([x, y]) {
+            let put_in = 1.0 / factor - 1.0;
+            assert!((found - put_in).abs() < 3.0 * sigma && sigma < 1.5e-3, "{found} +- {sigma}, put in {put_in}");
+        }
+        let doubt = wrong.uncertainty.flange.unwrap().without_size_doubt.unwrap();
+        assert!((2e-3..6e-3).contains(&doubt), "{doubt}");
+    }
+    assert_eq!(stated(1.0, 1.0, None).uncertainty.flange.unwrap().without_size_doubt, None);
 }
 
 /// The wrist alone turns: its links are short, and say next to nothing of the size of the plate.
