@@ -9,7 +9,7 @@ use super::dot_sizes::told_by_others;
 use super::size_seen::{line_missing, nowhere_whole};
 use super::{Detection, Outline, Picture, examine, other_kind, tags};
 use crate::error::{Code, Error, Notice, Result};
-use crate::files::{batches, is_turned_by_viewers, picture_size};
+use crate::files::{batches, is_turned_by_viewers, page_of, picture_size};
 use crate::series::{Plate, PlateKind, spread};
 
 /// Of a picture of three colours and its grey values.
@@ -80,6 +80,7 @@ pub fn detect_series(
         };
         name_image(&mut image.detection, path);
         image.detection.notices.extend(is_turned_by_viewers(path).then(turned));
+        image.detection.notices.extend(page_of(path).map(several_pages));
         image.detection.notices.extend((ink == Ink::Bright).then(bright));
         image
     };
@@ -271,6 +272,13 @@ fn turned() -> Notice {
         "its EXIF data ask viewers to turn or mirror it; its pixels are taken as they are stored, and so is the camera",
         "read images so elsewhere, too (in OpenCV with IMREAD_IGNORE_ORIENTATION)",
     )
+}
+
+/// Previews, and stacks of images.
+fn several_pages((pages, taken): (usize, usize)) -> Notice {
+    let what =
+        format!("the file holds {pages} pages, of which page {taken} is taken, the largest, or the first of such");
+    Notice::new(Code::ImagePages, "image", what, "write one image to each file")
 }
 
 /// Markers on glass in reflected light, for one.

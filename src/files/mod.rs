@@ -2,12 +2,15 @@
 
 pub mod jpeg;
 mod picture;
+mod tiff;
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-pub use picture::{MOST_SIDE_PX, batches, decode_picture, decoded_bytes, is_turned_by_viewers, is_whole, picture_size};
+pub use picture::{
+    MOST_SIDE_PX, batches, decode_picture, decoded_bytes, is_turned_by_viewers, is_whole, page_of, picture_size,
+};
 
 use crate::error::{Code, Error, Result};
 

@@ -8,7 +8,7 @@ use image::error::{ImageFormatHint, LimitError, LimitErrorKind, UnsupportedError
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits};
 
-use super::{FileKind, jpeg, open, read};
+use super::{FileKind, jpeg, open, read, tiff};
 use crate::error::{Code, Error, Result};
 
 /// Longest side that is accepted, px; the largest industrial sensors have about 20 000.
@@ -116,8 +116,31 @@ pub fn is_whole(path: &Path) -> Result<bool> {
     jpeg::is_complete(&mut Cursor::new(read(path, FileKind::Image)?)).map_err(io)
 }
 
+/// How many pages a TIFF file has, and which of them is read, from 1 on; `None` for other files and where there is one.
+pub fn page_of(path: &Path) -> Option<(usize, usize)> {
+    let (file, _) = open(path, FileKind::Image).ok()?;
+    let pages = tiff::pages(&mut BufReader::new(file)).ok().filter(|pages| pages.len() > 1)?;
+    Some((pages.len(), tiff::largest(&pages)? + 1))
+}
+
+/// What pictures are read from.
+trait Source: BufRead + Seek {}
+
+impl<T: BufRead + Seek> Source for T {}
+
+/// The file with its largest page first.
+fn with_largest_page<'a>(mut source: impl BufRead + Seek + 'a) -> ImageResult<Box<dyn Source + 'a>> {
+    // What is damaged is said by the decoder.
+    let pages = tiff::pages(&mut source).unwrap_or_default();
+    if let Some(page) = tiff::largest(&pages).filter(|page| *page > 0) {
+        return Ok(Box::new(Cursor::new(tiff::beginning_with(&pages[page], &mut source)?)));
+    }
+    source.rewind()?;
+    Ok(Box::new(source))
+}
+
 fn decoder<'a>(source: impl BufRead + Seek + 'a) -> ImageResult<impl ImageDecoder + 'a> {
-    let mut reader = ImageReader::new(source).with_guessed_format()?;
+    let mut reader = ImageReader::new(with_largest_page(source)?).with_guessed_format()?;
     if !reader.format().is_some_and(|f| FORMATS.contains(&f)) {
         let hint = reader.format().map_or(ImageFormatHint::Unknown, ImageFormatHint::Exact);
         let kind = UnsupportedErrorKind::Format(hint.clone());
