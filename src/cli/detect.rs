@@ -88,13 +88,12 @@ pub(super) fn run(args: &DetectArgs) -> Result<Verdict> {
         looked.notices.iter().cloned().chain(looked.images.iter().flat_map(SeenImage::notices)).collect();
     Notice::said_once(&notices).iter().for_each(|n| say_line!("note      {}", n.coded()));
     say_line!("results   {} ({written} files)", out.display());
-    let failures: Vec<&Error> = looked.images.iter().filter_map(|i| i.detection.failure.as_ref()).collect();
     let found = |i: &SeenImage| i.detection.observations.len();
     require_some(
         &name,
         looked.images.iter().map(|i| (i.name.as_str(), found(i), i.detection.failure.as_ref().map(Unused::from))),
     )?;
-    Ok(if failures.is_empty() { Verdict::Good } else { Verdict::GateFailed })
+    Ok(if looked.images.iter().all(is_used) { Verdict::Good } else { Verdict::GateFailed })
 }
 
 fn of_series(args: &DetectArgs, series: Series, pictures: &Pictures) -> Result<Looked> {
@@ -165,6 +164,11 @@ fn draw(looked: &Looked, drawable: &[(&SeenImage, &PathBuf, &String)], result: &
     Ok(())
 }
 
+/// Something was found, and nothing speaks against it.
+fn is_used(image: &SeenImage) -> bool {
+    image.detection.failure.is_none() && !image.detection.observations.is_empty()
+}
+
 /// The table: a line for every image, and the sum.
 fn text(images: &[SeenImage]) -> String {
     let widest = images.iter().map(|i| i.name.chars().count()).fold(5, usize::max);
@@ -176,11 +180,12 @@ fn text(images: &[SeenImage]) -> String {
         let noise = facts.map_or_else(|| "-".into(), |c| format!("{:.1}/{:.1}", c.noise[0], c.noise[1]));
         let rest = match &image.detection.failure {
             Some(failure) => format!("NOT USED: {}", failure.what),
+            None if !is_used(image) => format!("NOT USED: no marker found ({})", counts(std::iter::once(image))),
             None => counts(std::iter::once(image)),
         };
         text += &format!("{:widest$}  {found:5}  {rescued:7}  {blur:>7}  {noise:9}  {rest}\n", image.name);
     }
-    let used = images.iter().filter(|i| i.detection.failure.is_none()).count();
+    let used = images.iter().filter(|i| is_used(i)).count();
     let sum = |of: fn((usize, usize)) -> usize| images.iter().map(|i| of(marker_counts(i))).sum::<usize>();
     let (found, rescued) = (sum(|c| c.0), sum(|c| c.1));
     let label = "all";

@@ -104,9 +104,10 @@ impl From<circles::CircleDetection> for Detection {
     fn from(found: circles::CircleDetection) -> Self {
         let rings = found.inner_outer.filter(InnerOuter::asymmetric).map(|io| io.notice());
         let edges = found.lopsided.filter(|l| l.exceeds(LOPSIDED_PX)).map(lopsided_notice);
-        let notices = rings.into_iter().chain(edges).collect();
-        let failure = found.outcome.failure();
-        let failure = failure.map(|(code, what, remedy)| {
+        let spoilt = found.spoilt_edges().filter(|_| !found.found.is_empty());
+        let spoilt = spoilt.map(|(what, remedy)| Notice::new(Code::MarkersUnmeasured, "image", what, remedy));
+        let notices = rings.into_iter().chain(edges).chain(spoilt).collect();
+        let failure = found.failure().map(|(code, what, remedy)| {
             Error::new(code, "image", format!("{what}{}", found.dropped_summary()), remedy)
         });
         let dropped = |d: &circles::DroppedCandidate| Dropped {

@@ -198,6 +198,7 @@ codes! {
         ImageSizeDiffers "image_size_differs" "an image has another size or depth than the others",
         ImageDepth "image_depth" "pixels do not fit the stated number of bits",
         MarkersBright "markers_bright" "the markers are brighter than the ground and measured in the negative",
+        ImagePages "image_pages" "an image file holds several pages, of which one is taken",
         ImageTurned "image_turned" "viewers turn or mirror an image as its EXIF data ask; here pixels are as the sensor gave them",
         FlatFieldDrift "flat_field_drift" "dark or white images of the end differ from those of the begin",
         FlatFieldUseless "flat_field_useless" "white images are saturated, or not brighter than dark ones",
@@ -209,6 +210,7 @@ codes! {
         PlateContradicted "plate_contradicted" "the pattern that is seen is not that of the plate file",
         PlateLineHidden "plate_line_hidden" "a whole line of the plate is not seen where it should be",
         PlateNowhere "plate_nowhere" "no image can be used",
+        MarkersUnmeasured "markers_unmeasured" "most identified markers of an image cannot be measured",
         BlurAsymmetric "blur_asymmetric" "edges are blurred more to one side: coma or motion",
     }
     Input "Recordings" {
@@ -280,6 +282,7 @@ codes! {
         PoseOutOfReach "pose_out_of_reach" "the nominal robot reaches no such pose",
         JointReadingsWrong "joint_readings_wrong" "the readings of one joint are wrong at some stops",
         ReadingsExchanged "readings_exchanged" "images that were left out fit the readings of each other",
+        RowsMisordered "rows_misordered" "with the rows in the other order of the images' names (1, 2, .. 10 or 1, 10, .. 2) the images fit",
         RowsShifted "rows_shifted" "with the rows of joints.csv shifted by one the images fit",
         CameraMountWrong "camera_mount_wrong" "with the camera mounted the other way the images fit",
         ImagesMirrored "images_mirrored" "with the images mirrored they fit the joint readings",
@@ -306,6 +309,7 @@ codes! {
         HeldNearNominal "held_near_nominal" "outside the region of the stops the robot is held near the nominal one",
         FewImages "few_images" "few images: the nominal model decides much of the result",
         FocusChanged "focus_changed" "focus or zoom changed during the series",
+        ReadingsRounded "readings_rounded" "joint readings were rounded to a step that is as large as the joint noise",
         JointNoiseLarge "joint_noise_large" "the joint noise is larger than robots have",
         JointNoiseContradicted "joint_noise_contradicted" "the data show another joint noise than the stated one",
         PlateMoved "plate_moved" "the plate was moved: images were left out",

@@ -1,7 +1,10 @@
 //! The circle detector on rendered pictures with known truth.
 
 use crate::circles_support::{View, errors, report, scene};
-use robotcal::detect::circles::{Options, Outcome, detect};
+use crate::grids::jpeg;
+use robotcal::Code;
+use robotcal::detect::Detection;
+use robotcal::detect::circles::{CircleDetection, DroppedCandidate, Found, Options, Outcome, Reason, detect};
 use robotcal::study::image_stage::{MirrorAnswer, Plates, identity_view};
 
 #[test]
@@ -25,4 +28,67 @@ fn a_mirror_image_is_named_where_its_lattice_slips() {
     let (view, ..) = identity_view(&Plates::standard().unwrap(), 14330);
     assert!(view.identified && view.wrong == 0);
     assert_eq!(view.mirror, Some(MirrorAnswer::Named));
+}
+
+fn tilted() -> View {
+    View { distance_m: 0.55, tilt_deg: 25.0, azimuth_deg: 30.0, roll_deg: 20.0, ..View::default() }
+}
+
+/// Paper at and above full scale, up to nearly half as much again: the edges of the markers are clipped on their light side.
+#[test]
+fn overexposed_paper_costs_no_marker() {
+    for times in [1.0, 1.05, 1.2, 1.45] {
+        let mut view = tilted();
+        view.conditions.exposure = times / view.conditions.light_reflectance;
+        let scene = scene(&view);
+        let found = detect(&scene.render(3), &scene.plate, &Options::default()).unwrap();
+        let e = errors(&scene, &found);
+        report(&scene, &found, &e);
+        assert_eq!(e.wrong, 0, "{times}");
+        assert!(e.found as f64 >= 0.95 * e.visible as f64, "{times}: {} of {}", e.found, e.visible);
+        assert!(e.nees() < 1.5 && e.rms() < 0.03, "{times}: nees {}, rms {} px", e.nees(), e.rms());
+    }
+}
+
+/// Strong compression rings beside every edge and flattens the paper: the markers are found, and sigma covers what it did to them.
+#[test]
+fn strong_compression_costs_no_marker() {
+    for quality in [35, 30] {
+        let scene = scene(&tilted());
+        let picture = jpeg(&scene.render(4), quality);
+        let found = detect(&picture, &scene.plate, &Options::default()).unwrap();
+        let e = errors(&scene, &found);
+        report(&scene, &found, &e);
+        assert_eq!(e.wrong, 0, "{quality}");
+        assert!(e.found as f64 >= 0.9 * e.visible as f64, "{quality}: {} of {}", e.found, e.visible);
+        assert!(e.nees() < 2.0 && e.rms() < 0.1, "{quality}: nees {}, rms {} px", e.nees(), e.rms());
+    }
+}
+
+/// An image of which every marker was identified and none measured is no image that can be used.
+#[test]
+fn markers_that_are_all_saturated_are_a_failure() {
+    let scene = scene(&tilted());
+    let mut seen = detect(&scene.render(5), &scene.plate, &Options::default()).unwrap();
+    let usable = Detection::from(seen.clone());
+    let is_told = |of: &Detection| of.notices.iter().any(|n| n.code == Code::MarkersUnmeasured);
+    assert!(usable.failure.is_none() && !is_told(&usable), "{:?}", usable.notices);
+    let lost = |reason| {
+        move |f: &Found| {
+            let ellipse = Some(f.measured.outer.ellipse);
+            DroppedCandidate { uv: f.measured.outer.ellipse.centre, reason, ellipse, marker: Some(f.marker) }
+        }
+    };
+    let all = std::mem::take(&mut seen.found);
+    seen.observations.clear();
+    for reason in [Reason::Saturated, Reason::EdgeModel, Reason::CutByBorder] {
+        let dropped = all.iter().map(lost(reason)).collect();
+        let detection = Detection::from(CircleDetection { dropped, ..seen.clone() });
+        assert_eq!(detection.failure.map(|f| f.code), Some(Code::MarkersUnmeasured), "{reason}");
+    }
+    // A third of them are left.
+    let third = all.len() / 3;
+    let dropped = all[third..].iter().map(lost(Reason::Saturated)).collect();
+    let part = Detection::from(CircleDetection { dropped, found: all[..third].to_vec(), ..seen.clone() });
+    assert!(part.failure.is_none() && is_told(&part), "{:?}", part.notices);
 }

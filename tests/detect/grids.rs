@@ -84,7 +84,7 @@ fn sharpen(picture: Picture, amount: f64, sigma: f64) -> Picture {
     Picture { pixels, ..picture }
 }
 
-fn jpeg(picture: &Picture, quality: u8) -> Picture {
+pub fn jpeg(picture: &Picture, quality: u8) -> Picture {
     let bytes = picture.pixels.iter().map(|v| *v as u8).collect();
     let image = GrayImage::from_raw(picture.width as u32, picture.height as u32, bytes).unwrap();
     let mut file = Cursor::new(Vec::new());
@@ -224,6 +224,34 @@ fn small_dots_far_apart_are_found() {
             assert_eq!((tally.found, tally.wrong), (tally.dots, 0), "{keys} {radius_m}");
             assert!((0.85..1.15).contains(&tally.normalised), "{keys} {radius_m} {}", tally.normalised);
         }
+    }
+}
+
+/// The edge of a shadow makes dots beside it look larger: it turns no grid of equal dots, whether their radius is stated or not.
+#[test]
+fn the_edge_of_a_shadow_turns_no_grid_of_equal_dots() {
+    for keys in ["radius_m = 0.0048", ""] {
+        let stated = grid(&format!("columns = 11\nrows = 8\n{keys}"));
+        let view = View { distance_m: 0.36, tilt_deg: 20.0, azimuth_deg: 50.0, roll_deg: 8.0, ..View::default() };
+        let scene = Scene { plate: printed(&stated, &[], &[]), camera_from_plate: pose(&view), ..scene(&view) };
+        let lit = scene.render(1);
+        let (mut tally, mut seen) = (Tally::default(), 0);
+        for begin_px in (350..1250).step_by(90) {
+            let shade = |(k, v): (usize, &f32)| {
+                let (x, y) = ((k % lit.width) as f64, (k / lit.width) as f64);
+                let depth = ((0.8 * x + 0.5 * y - f64::from(begin_px)) / 2.0).clamp(0.0, 1.0);
+                (f64::from(*v) * (1.0 - 0.65 * depth)).round() as f32
+            };
+            let picture = Picture { pixels: lit.pixels.iter().enumerate().map(shade).collect(), ..lit.clone() };
+            // Too many dots may be lost beside the edge.
+            let Ok(detection) = detect(&picture, &stated) else { continue };
+            tally.add(&scene, &detection, &|id| id);
+            let codes: Vec<Code> = detection.notices.iter().map(|n| n.code).collect();
+            assert!(codes.contains(&Code::PlateSymmetric), "{keys} {begin_px}: {codes:?}");
+            seen += 1;
+        }
+        tally.report(keys);
+        assert!(seen >= 3 && tally.wrong == 0 && tally.found > 0, "{keys}: {seen} {tally:?}");
     }
 }
 

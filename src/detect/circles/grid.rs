@@ -7,7 +7,7 @@
 //!
 //! Sizes that the plate does not tell are taken from the picture. Where it does not tell which dots are larger either, the plate
 //! is turned so that the first of them has the least id: that is the same corner in every picture. What no dot tells is left as the
-//! more upright of the turns.
+//! more upright of the turns; so is a plate whose radii are stated and equal.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,7 +21,7 @@ use super::grid_seen::{Extent, Outer, Shape, View, outline};
 use super::lattice::{Apart, Cell, Lattice};
 use super::neighbour_check::{Board, Placed};
 use super::pipeline::{Cut, Identified, detect_coded};
-use super::smoothed::{as_before, smoothed};
+use super::smoothed::{SMOOTHINGS_PX, as_before, smoothed};
 use super::types::{CircleDetection, Options, Outcome, Reason};
 use crate::detect::size_seen::{Counted, beyond, other_rows, other_size};
 use crate::detect::{Detection, Outline, Picture, Sizes};
@@ -33,8 +33,6 @@ use crate::series::{Marker, Plate};
 const OFF_LATTICE: f64 = 0.2;
 /// Smallest semi-axis of a dot, px: no code is to be read from it, and a whole lattice speaks for it.
 const SMALLEST_PX: f64 = 1.5;
-/// Smoothings that are tried where edges are not blurred steps, px.
-const SMOOTHINGS_PX: [f64; 2] = [0.7, 1.0];
 /// Lines beyond the lattice at which dots of the plate are looked for.
 const FURTHER: i32 = 4;
 /// A stated radius and the one seen differ by no more than this, as a logarithm.
@@ -51,12 +49,12 @@ const RADIUS_OFF: f64 = 0.4;
 pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Result<Detection> {
     let grid = Grid::of(plate)?;
     let options = &Options { smallest_semi_axis_px: options.smallest_semi_axis_px.min(SMALLEST_PX), ..*options };
-    let (mut best, mut facts) = grid.look(picture, options)?;
+    let (mut best, mut facts) = grid.look(picture, options, 0.0)?;
     for sigma_px in SMOOTHINGS_PX {
         if !spoilt(&best) {
             break;
         }
-        let (found, other) = grid.look(&smoothed(picture, sigma_px), options)?;
+        let (found, other) = grid.look(&smoothed(picture, sigma_px), options, sigma_px)?;
         if found.found.len() > best.found.len() {
             best = as_before(found, sigma_px);
             allow_for_glare(&mut best, picture.full_scale, sigma_px);
@@ -121,9 +119,12 @@ struct Grid<'a> {
 }
 
 /// What the plate says about the sizes of its dots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Told {
     /// All radii, of more than one size.
     Radii,
+    /// One radius for all dots: the outline alone tells how the plate is turned, however large light makes a dot look.
+    Equal,
     /// Which of them are not as most are.
     Places,
     Nothing,
@@ -135,9 +136,9 @@ impl<'a> Grid<'a> {
         Ok(Self { plate, cells, step_m })
     }
 
-    fn look(&self, picture: &Picture, options: &Options) -> Result<(CircleDetection, Facts)> {
+    fn look(&self, picture: &Picture, options: &Options, smoothed_px: f64) -> Result<(CircleDetection, Facts)> {
         let mut facts = Facts::default();
-        let found = detect_coded(picture, options, Apart::Far, |lattices, candidates| {
+        let found = detect_coded(picture, options, (Apart::Far, smoothed_px), |lattices, candidates| {
             let (identified, seen) = self.identify(picture, lattices, candidates)?;
             facts = seen;
             Ok(identified)
@@ -155,10 +156,12 @@ impl<'a> Grid<'a> {
             .any(|m| radius(m) != first || m.inner_radius_m != self.plate.markers[0].inner_radius_m)
         {
             Told::Radii
-        } else if self.plate.large.is_empty() {
-            Told::Nothing
-        } else {
+        } else if !self.plate.large.is_empty() {
             Told::Places
+        } else if first > 0.0 {
+            Told::Equal
+        } else {
+            Told::Nothing
         }
     }
 
@@ -174,19 +177,23 @@ impl<'a> Grid<'a> {
             return nothing(if candidates.is_empty() { Outcome::NoCandidates } else { Outcome::NoLattice });
         };
         let told = self.told();
-        let Some(mut dots) = Dots::of(lattice, candidates) else { return nothing(Outcome::Ambiguous) };
+        let dots = if told == Told::Equal { Dots::alike(lattice, candidates) } else { Dots::of(lattice, candidates) };
+        let Some(mut dots) = dots else { return nothing(Outcome::Ambiguous) };
+        if told == Told::Nothing {
+            dots.leave_out_uneven_light(lattice, candidates);
+        }
         let plate = match told {
             Told::Radii => self.plate.clone(),
             Told::Places => self.with_large(&dots, |marker| self.plate.large.contains(&self.plate.markers[marker].id)),
-            Told::Nothing => self.with_large(&dots, |_| false),
+            Told::Equal | Told::Nothing => self.with_large(&dots, |_| false),
         };
-        if !self.agrees(&dots) || (matches!(told, Told::Places) && dots.other.is_empty()) {
+        if !self.agrees(&dots) || (told == Told::Places && dots.other.is_empty()) {
             return nothing(Outcome::Ambiguous);
         }
         let code = self.code(&plate)?;
         let classes = match told {
             Told::Radii | Told::Places => code.classes_of(lattice, candidates),
-            Told::Nothing => lattice.cells.keys().map(|cell| (*cell, Some(0))).collect(),
+            Told::Equal | Told::Nothing => all_alike(lattice),
         };
         let (mut laid, outcome) = place(&code, &self.cells, &classes);
         let view = View { picture, lattice, candidates };
@@ -199,8 +206,9 @@ impl<'a> Grid<'a> {
             return Ok((self.identified(self.plate.clone(), Board::new(), Outcome::Ambiguous)?, facts));
         }
         let outline_tells = laid.len() == 1;
-        if let (Told::Nothing, Some(any)) = (&told, laid.first()) {
+        if let (Told::Nothing, Some(any)) = (told, laid.first()) {
             dots.add(missing_dots(picture, lattice, candidates, (any, &self.cells), &dots.usual));
+            dots.leave_out_uneven_light(lattice, candidates);
             let first = laid.iter().map(|l| others(l, &dots)).min();
             laid.retain(|l| first.as_ref() == Some(&others(l, &dots)));
         }
@@ -208,7 +216,7 @@ impl<'a> Grid<'a> {
             return Ok((self.identified(self.plate.clone(), Board::new(), outcome)?, facts));
         };
         let plate = match told {
-            Told::Radii | Told::Places => plate,
+            Told::Radii | Told::Places | Told::Equal => plate,
             Told::Nothing => self.with_found(&dots, chosen),
         };
         let elsewhere = others(chosen, &dots);
@@ -219,10 +227,13 @@ impl<'a> Grid<'a> {
         if laid.iter().any(|other| chosen.is_told_from(other, &code, &self.cells)) {
             return nothing(Outcome::Ambiguous);
         }
-        let classes = self.code(&plate)?.classes_of(lattice, candidates);
+        let classes = match told {
+            Told::Equal => all_alike(lattice),
+            Told::Radii | Told::Places | Told::Nothing => self.code(&plate)?.classes_of(lattice, candidates),
+        };
         let board = board(chosen, lattice, &classes);
         let sizes = match told {
-            Told::Radii => Sizes::default(),
+            Told::Radii | Told::Equal => Sizes::default(),
             Told::Places | Told::Nothing => self.sizes(&plate, &dots),
         };
         facts.sizes = if outline_tells { Sizes { large: Vec::new(), ..sizes } } else { sizes };
@@ -344,6 +355,11 @@ fn others(laid: &Laid, dots: &Dots) -> Vec<(i32, i32)> {
     let mut all: Vec<(i32, i32)> = dots.other.keys().map(|c| laid.apply(*c)).map(|(i, j)| (j, i)).collect();
     all.sort_unstable();
     all
+}
+
+/// Every dot is of the only class.
+fn all_alike(lattice: &Lattice) -> Classes {
+    lattice.cells.keys().map(|cell| (*cell, Some(0))).collect()
 }
 
 fn board(laid: &Laid, lattice: &Lattice, classes: &Classes) -> Board {

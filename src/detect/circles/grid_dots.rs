@@ -13,6 +13,9 @@ const GAP: f64 = 0.2;
 const MISSING: f64 = 0.3;
 /// Largest share of dots that are not as most are.
 const FEW: f64 = 0.34;
+/// Paper beside neighbouring dots differs by no more in even light, as a logarithm: a shadow that moves an edge by enough to pass for another
+/// size is deeper, and vignetting from dot to dot is a tenth of it.
+const EVEN_LIGHT: f64 = 0.15;
 
 /// A dot as seen; lengths in steps of the lattice.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +50,29 @@ impl Dots {
         let usual = Dot { radius: middle(|d| d.radius)?, ratio: middle(|d| d.ratio)? };
         let other: BTreeMap<Cell, Dot> = all.into_iter().filter(|(_, d)| !is_usual(d)).collect();
         ((other.len() as f64) < FEW * lattice.cells.len() as f64).then_some(Self { usual, other })
+    }
+
+    /// All dots as alike, whatever their sizes look like.
+    pub fn alike(lattice: &Lattice, candidates: &[Candidate]) -> Option<Self> {
+        let all = || lattice.cells.values().map(|site| (site.relative_radius(&candidates[site.candidate]), site));
+        let open = |(_, site): &(f64, &super::lattice::Site)| candidates[site.candidate].open;
+        let is_open = 2 * all().filter(open).count() > lattice.cells.len();
+        let ratios = || all().filter(open).map(|(_, site)| candidates[site.candidate].hole.unwrap_or(0.5)).collect();
+        let ratio = if is_open { middle(ratios())? } else { 0.0 };
+        let radius = middle(all().filter(|dot| open(dot) == is_open).map(|(radius, _)| radius).collect())?;
+        Some(Self { usual: Dot { radius, ratio }, other: BTreeMap::new() })
+    }
+
+    /// Dots that look larger or smaller beside a change of the light count as usual: the edge of a shadow moves edges, and makes no ring.
+    pub fn leave_out_uneven_light(&mut self, lattice: &Lattice, candidates: &[Candidate]) {
+        let paper = |cell: &Cell| lattice.cells.get(cell).map(|site| f64::from(candidates[site.candidate].paper));
+        let around = |(i, j): Cell| (i - 1..=i + 1).flat_map(move |i| (j - 1..=j + 1).map(move |j| (i, j)));
+        let is_even = |cell: &Cell| {
+            let papers = || around(*cell).filter_map(|other| paper(&other));
+            (papers().fold(0.0, f64::max) / papers().fold(f64::INFINITY, f64::min)).ln() < EVEN_LIGHT
+        };
+        let usual = self.usual.ratio > 0.0;
+        self.other.retain(|cell, dot| (dot.ratio > 0.0) != usual || is_even(cell));
     }
 
     /// Adds dots that are not on the lattice where they are not as most are.

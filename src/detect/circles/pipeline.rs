@@ -8,6 +8,7 @@ use super::candidate::{Candidate, candidates, largest_marker};
 use super::code::{MarkerCode, Verdict};
 use super::edge_model::Pixels;
 use super::ellipse::Ellipse;
+use super::glare::allow_for_glare;
 use super::lattice::{Apart, Buckets, Cell, Lattice, lattices};
 use super::levels::Levels;
 use super::measure::{Camera, THRESHOLD, Target, drop_target, learn, target_of};
@@ -15,6 +16,7 @@ use super::neighbour_check::{Board, Placed, around, check_neighbours, continuati
 use super::predicted::Predicted;
 use super::refine::{Fit, refine};
 use super::rescue::{Figure, Place, rescue};
+use super::smoothed::{SMOOTHINGS_PX, as_before, smoothed, variance_factor};
 use super::types::{CircleDetection, DroppedCandidate, Found, InnerOuter, Options, Outcome, Reason};
 use crate::detect::Picture;
 use crate::error::{Code, Error, Result};
@@ -42,10 +44,22 @@ pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Cir
             "give a plate of kind coded-circles with plate.csv as made by `robotcal plate`",
         )
     })?;
-    detect_coded(picture, options, Apart::Near, |lattices, candidates| {
-        let (board, outcome) = identify(&code, lattices, candidates);
-        Ok(Identified { plate: plate.clone(), code, board, outcome, cut: Cut::Left })
-    })
+    let look = |picture: &Picture, smoothed_px: f64| {
+        detect_coded(picture, options, (Apart::Near, smoothed_px), |lattices, candidates| {
+            let (board, outcome) = identify(&code, lattices, candidates);
+            Ok(Identified { plate: plate.clone(), code: code.clone(), board, outcome, cut: Cut::Left })
+        })
+    };
+    let mut best = look(picture, 0.0)?;
+    for sigma_px in SMOOTHINGS_PX {
+        if !best.is_clipped() && best.spoilt_edges().is_none() {
+            break;
+        }
+        let mut others = as_before(look(&smoothed(picture, sigma_px), sigma_px)?, sigma_px);
+        allow_for_glare(&mut others, picture.full_scale, sigma_px);
+        best.complete(others);
+    }
+    Ok(best)
 }
 
 /// What was recognised.
@@ -67,11 +81,11 @@ pub(super) enum Cut {
     Measured,
 }
 
-/// The stages around the identification.
+/// The stages around the identification, in a picture that was smoothed by so many px before.
 pub(super) fn detect_coded(
     picture: &Picture,
     options: &Options,
-    apart: Apart,
+    (apart, smoothed_px): (Apart, f64),
     identify: impl FnOnce(&[Lattice], &[Candidate]) -> Result<Identified>,
 ) -> Result<CircleDetection> {
     if picture.width < 16 || picture.height < 16 || picture.pixels.len() != picture.width * picture.height {
@@ -86,8 +100,8 @@ pub(super) fn detect_coded(
     attach(&mut board, &code, &candidates);
     refused.extend(check_neighbours(&mut board, &code, &candidates));
     drop_unused(&board, &refused, &lattices, &candidates, &mut dropped);
-    let mut work =
-        Work { picture, plate: &plate, code: &code, cut, candidates: &candidates, pixels: Pixels::default() };
+    let pixels = Pixels::default();
+    let mut work = Work { picture, plate: &plate, code: &code, cut, candidates: &candidates, pixels, smoothed_px };
     let measured = work.measure(&board, &levels, options, &mut dropped);
     Ok(work.detection(&board, measured, outcome, dropped))
 }
@@ -233,6 +247,7 @@ struct Work<'a> {
     cut: Cut,
     candidates: &'a [Candidate],
     pixels: Pixels,
+    smoothed_px: f64,
 }
 
 /// Measured markers, blur and noise of the picture.
@@ -388,7 +403,8 @@ impl Work<'_> {
         let (measured, cross) = (&entry.fit.measured, entry.fit.cross);
         let inner = measured.inner.map(|i| {
             let (vi, vo) = (i.covariance, measured.outer.covariance);
-            let sigma = [0, 1].map(|a| (vi[2 * a] + vo[2 * a] - 2.0 * cross[a]).max(1e-10).sqrt());
+            let factor = variance_factor(measured.blur_px, self.smoothed_px);
+            let sigma = [0, 1].map(|a| (factor * (vi[2 * a] + vo[2 * a] - 2.0 * cross[a])).max(1e-10).sqrt());
             Inner { radius: marker.inner_radius_m / self.plate.pitch_m, centre: i.ellipse.centre, sigma }
         });
         let outer_radius = marker.outer_radius_m / self.plate.pitch_m;

@@ -127,17 +127,15 @@ fn once(
 ) -> Result<(State, Normal, f64), Reason> {
     let (wanted, saturated) = gather(picture, start, anchor, pixels);
     let parameters = if start.ratio.is_some() { ANNULUS } else { DISC };
-    if saturated * 5 > wanted {
-        return Err(Reason::Saturated);
-    }
     let visible = pixels.count as f64 / wanted.max(1) as f64;
+    let missing = if 2 * saturated > wanted - pixels.count { Reason::Saturated } else { Reason::CutByBorder };
     if !start.nearby.is_empty() {
         lift(pixels, start.nearby, anchor);
     }
     // what lies beyond the border is missed less where the neighbours are taken off: the band is wider than it must be
     let whole = start.nearby.is_empty() && start.shape_sigma.is_none();
-    if pixels.count < 2 * parameters || (whole && visible < WHOLE) || visible < 0.35 {
-        return Err(Reason::CutByBorder);
+    if saturated * 5 > wanted || pixels.count < 2 * parameters || (whole && visible < WHOLE) || visible < 0.35 {
+        return Err(missing);
     }
     let mut state = initial(start, anchor);
     let prior = Prior::of(start, picture);

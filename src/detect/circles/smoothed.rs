@@ -19,6 +19,8 @@ use crate::detect::Picture;
 
 /// What a halo that clipping cuts off leaves beyond noise, px per axis; seen in rendered pictures.
 const SYSTEMATIC_PX: f64 = 0.004;
+/// Smoothings that are tried where edges are not blurred steps, px.
+pub(super) const SMOOTHINGS_PX: [f64; 2] = [0.7, 1.0];
 /// Of the kernel, in sigmas.
 const REACH: f64 = 4.0;
 
@@ -60,13 +62,22 @@ fn transposed(pixels: &[f32], width: usize) -> Vec<f32> {
     (0..pixels.len()).map(|k| pixels[k % height * width + k / height]).collect()
 }
 
+/// By what the variance of a place exceeds that of noise that was white in the smoothed picture, where its edge has this blur.
+pub(super) fn variance_factor(edge_px: f64, sigma_px: f64) -> f64 {
+    if sigma_px > 0.0 { edge_px / edge_px.hypot(sigma_px) / kept(sigma_px) } else { 1.0 }
+}
+
+/// Share of the variance of a pixel that is left.
+fn kept(sigma_px: f64) -> f64 {
+    1.0 / (4.0 * PI * sigma_px * sigma_px)
+}
+
 /// What was measured in the smoothed picture as it would be said of the picture itself: blur and noise are those before it, and
 /// the covariances are those of noise that was white before it.
 pub(super) fn as_before(mut found: CircleDetection, sigma_px: f64) -> CircleDetection {
-    let kept = 1.0 / (4.0 * PI * sigma_px * sigma_px);
     for f in &mut found.found {
         let edge = f.measured.blur_px;
-        let factor = edge / edge.hypot(sigma_px) / kept;
+        let factor = variance_factor(edge, sigma_px);
         for imaged in std::iter::once(&mut f.measured.outer).chain(&mut f.measured.inner) {
             let [uu, uv, vv] = imaged.covariance.map(|c| c * factor);
             let floor = SYSTEMATIC_PX * SYSTEMATIC_PX;
@@ -76,7 +87,7 @@ pub(super) fn as_before(mut found: CircleDetection, sigma_px: f64) -> CircleDete
     }
     found.observations = found.found.iter().flat_map(super::types::Found::observations).collect();
     found.blur_px = before(found.blur_px, sigma_px);
-    found.noise = found.noise.map(|n| n / kept.sqrt());
+    found.noise = found.noise.map(|n| n / kept(sigma_px).sqrt());
     found
 }
 

@@ -1,6 +1,6 @@
 //! What the detector is asked and what it answers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use super::asymmetry::Drift;
@@ -248,6 +248,11 @@ pub struct CircleDetection {
     pub lopsided: Option<Drift>,
 }
 
+/// A marker that is as near as this to a lost one is the same, px.
+const SAME_PLACE_PX: f64 = 2.0;
+/// Share of the identified markers that is many.
+const MANY_CLIPPED: f64 = 0.1;
+
 impl CircleDetection {
     /// Number of dropped candidates for every reason.
     pub fn dropped_counts(&self) -> BTreeMap<Reason, usize> {
@@ -256,6 +261,67 @@ impl CircleDetection {
             *counts.entry(d.reason).or_insert(0) += 1;
         }
         counts
+    }
+
+    /// What went wrong and what to try; `None` where markers were measured.
+    pub(in crate::detect) fn failure(&self) -> Option<(Code, String, &'static str)> {
+        if let Some((code, what, remedy)) = self.outcome.failure() {
+            return Some((code, what.to_owned(), remedy));
+        }
+        let (what, remedy) = self.found.is_empty().then(|| {
+            let others =
+                || ("no marker that is identified can be measured".to_owned(), "bring more of the plate into the view");
+            self.spoilt_edges().unwrap_or_else(others)
+        })?;
+        Some((Code::MarkersUnmeasured, what, remedy))
+    }
+
+    /// Many markers are lost for no other reason than that their paper is at full scale.
+    pub(super) fn is_clipped(&self) -> bool {
+        let clipped = self.dropped.iter().filter(|d| d.marker.is_some() && d.reason == Reason::Saturated).count();
+        clipped > 0 && clipped as f64 >= MANY_CLIPPED * (clipped + self.found.len()) as f64
+    }
+
+    /// Takes the markers that were identified and lost from what was found at their places in a smoothed copy of the picture.
+    pub(super) fn complete(&mut self, smoothed: Self) {
+        let lost: BTreeMap<u32, [f64; 2]> = self.dropped.iter().filter_map(|d| Some((d.marker?, d.uv))).collect();
+        let is_lost = |f: &Found| {
+            let centre = f.measured.outer.ellipse.centre;
+            lost.get(&f.marker).is_some_and(|uv| (uv[0] - centre[0]).hypot(uv[1] - centre[1]) < SAME_PLACE_PX)
+        };
+        if self.found.is_empty() {
+            (self.blur_px, self.noise) = (smoothed.blur_px, smoothed.noise);
+        }
+        self.found.extend(smoothed.found.into_iter().filter(is_lost));
+        self.found.sort_by_key(|f| f.marker);
+        self.found.dedup_by_key(|f| f.marker);
+        let found: BTreeSet<u32> = self.found.iter().map(|f| f.marker).collect();
+        self.dropped.retain(|d| d.marker.is_none_or(|marker| !found.contains(&marker)));
+        self.observations = self.found.iter().flat_map(Found::observations).collect();
+    }
+
+    /// Why most of the markers that are identified cannot be measured, where their edges are no blurred steps, and what to try.
+    pub(in crate::detect) fn spoilt_edges(&self) -> Option<(String, &'static str)> {
+        let count =
+            |of: &[Reason]| self.dropped.iter().filter(|d| d.marker.is_some() && of.contains(&d.reason)).count();
+        let (clipped, edges) = (count(&[Reason::Saturated]), count(&[Reason::EdgeModel, Reason::NoConvergence]));
+        let (lost, all) = (clipped + edges, clipped + edges + self.found.len());
+        if lost <= self.found.len() {
+            return None;
+        }
+        Some(if clipped >= edges {
+            (
+                format!("{lost} of {all} identified markers are saturated: the paper is overexposed"),
+                "expose for less time or with less gain or light, so that the paper stays below full scale",
+            )
+        } else {
+            (
+                format!(
+                    "{lost} of {all} identified markers have edges that no blur explains: strong JPEG compression, sharpening or motion"
+                ),
+                "store images as PNG, or as JPEG of quality 50 or more; switch off sharpening, and see that nothing moves",
+            )
+        })
     }
 
     /// The reasons of the dropped candidates in words, in brackets; nothing where there are none.
