@@ -103,7 +103,7 @@ impl Inputs {
     /// # Errors
     /// Recordings without stops or images; those of [`Series::with_recording`].
     pub fn with_recordings(self, options: &RecordingOptions) -> Result<Self> {
-        let options = RecordingOptions { joints: self.chain.readings.clone(), ..options.clone() };
+        let options = options.clone().of_chain(&self.chain);
         let series = self.pictures.of_recordings(self.series, &options)?;
         Ok(Self { series, ..self })
     }

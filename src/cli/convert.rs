@@ -79,8 +79,9 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Verdict> {
     match new {
         None => verdict = to_recording(args, chain)?,
         Some(new) => {
-            let joints = chain.map_or_else(Vec::new, |c| c.readings);
-            let extracted = convert_recording(&args.from, new.path(), &args.recording.options(&joints)?)?;
+            let options = args.recording.options(&[])?;
+            let options = chain.map_or(options.clone(), |chain| options.of_chain(&chain));
+            let extracted = convert_recording(&args.from, new.path(), &options)?;
             new.finish()?;
             say!("{}", text(&extracted));
         }

@@ -116,7 +116,7 @@ fn read_recording(path: &Path) -> Result<Series> {
     manifest.mcap = Some(file_name(path));
     manifest.require_camera_and_plate(&manifest_path)?;
     let plate = plate_of(&manifest, &folder, &mut inputs)?;
-    let name = path.file_stem().map_or_else(|| "series".into(), |n| n.to_string_lossy().into_owned());
+    let name = own_manifest(path).file_stem().map_or_else(|| "series".into(), |n| n.to_string_lossy().into_owned());
     plain_name("series", &name, path.display())?;
     let source = Source::Recording(path.to_path_buf());
     let (stops, spatial, notices) = (Stops::default(), SpatialFiles::default(), Vec::new());
@@ -532,7 +532,7 @@ impl Series {
     /// The file that says what is said of the series, for messages: that of a recording has a name of its own.
     pub fn manifest_file(&self) -> PathBuf {
         let usual = self.folder.join("series.toml");
-        let own = self.manifest.mcap.as_ref().map(|recording| self.folder.join(recording).with_extension("toml"));
+        let own = self.manifest.mcap.as_ref().map(|recording| own_manifest(&self.folder.join(recording)));
         own.filter(|own| self.inputs.iter().any(|input| input.path == *own)).unwrap_or(usual)
     }
 
@@ -554,9 +554,18 @@ impl Series {
     }
 }
 
+/// `<its name>.toml` beside a recording; a dot in the name of a folder is a part of it.
+fn own_manifest(recording: &Path) -> PathBuf {
+    let has_ending = recording.extension().is_some_and(|ending| ["mcap", "db3", "bag"].iter().any(|e| ending == *e));
+    if has_ending || recording.is_file() {
+        return recording.with_extension("toml");
+    }
+    recording.with_file_name(format!("{}.toml", file_name(recording)))
+}
+
 /// The manifest of a recording that is given by itself: `<its name>.toml` or `series.toml` beside it.
 pub(super) fn manifest_beside(recording: &Path) -> Result<PathBuf> {
-    let candidates = [recording.with_extension("toml"), recording.with_file_name("series.toml")];
+    let candidates = [own_manifest(recording), recording.with_file_name("series.toml")];
     let found = candidates.iter().find(|p| p.is_file()).cloned();
     found.ok_or_else(|| {
         let what = format!(

@@ -3,11 +3,9 @@
 use std::path::Path;
 
 use super::camera_section::CameraMount;
-use super::joints::Stops;
 use super::manifest::{AngleUnit, Manifest};
 use super::read::{Series, Source, file_name, manifest_beside, optional_images};
 use super::recording::{CameraInfo, Extracted, RecordingOptions, extract};
-use super::units::SMALL_DEG;
 use crate::error::{Code, Error, Notice, Result};
 
 impl Series {
@@ -18,12 +16,13 @@ impl Series {
     /// As [`extract`].
     pub fn with_recording(mut self, images: &Path, options: &RecordingOptions) -> Result<Self> {
         let Source::Recording(recording) = &self.source else { return Ok(self) };
-        let extracted = extract(recording, images, options)?;
+        let options = RecordingOptions { joint_unit: self.manifest.joint_unit, ..options.clone() };
+        let extracted = extract(recording, images, &options)?;
         let (dark, white) = optional_images(&self.folder)?;
         let written = self.manifest_file();
         self.source = Source::Images { folder: images.to_path_buf(), dark, white };
         self.notices.extend(extracted.notices);
-        self.notices.extend(settle_unit(&mut self.manifest, &extracted.stops, &self.folder, &written));
+        self.notices.extend(settle_unit(&mut self.manifest, extracted.joint_unit, &self.folder, &written));
         self.inputs.extend(extracted.inputs);
         fill_camera(&mut self.manifest, extracted.camera_info.as_ref());
         self.stops = extracted.stops;
@@ -32,10 +31,9 @@ impl Series {
 }
 
 /// Joint states are in rad: what stands beside a recording may be of the series that it was made of, in degrees.
-fn settle_unit(manifest: &mut Manifest, stops: &Stops, recording: &Path, written: &Path) -> Option<Notice> {
+fn settle_unit(manifest: &mut Manifest, recorded: AngleUnit, recording: &Path, written: &Path) -> Option<Notice> {
     let stated = *manifest.joint_unit.get_or_insert(AngleUnit::Rad);
-    let mut all = stops.stops.iter().filter_map(|stop| stop.raw_readings.as_ref()).flatten();
-    if stated == AngleUnit::Rad || !all.all(|q| q.abs() < SMALL_DEG) {
+    if stated == recorded {
         return None;
     }
     manifest.joint_unit = Some(AngleUnit::Rad);
@@ -90,7 +88,11 @@ pub fn convert_recording(recording: &Path, folder: &Path, options: &RecordingOpt
 }
 
 fn write_folder(recording: &Path, unfinished: &Path, folder: &Path, options: &RecordingOptions) -> Result<Extracted> {
-    let mut extracted = extract(recording, &unfinished.join("images"), options)?;
+    // What is wrong with the manifest is said when it is carried over.
+    let beside = manifest_beside(recording).ok().and_then(|path| Manifest::read(&path, &mut Vec::new()).ok());
+    let joint_unit = beside.and_then(|manifest| manifest.joint_unit);
+    let options = RecordingOptions { joint_unit, ..options.clone() };
+    let mut extracted = extract(recording, &unfinished.join("images"), &options)?;
     let manifest = carried_manifest(recording, unfinished, &mut extracted)?;
     write(&unfinished.join("series.toml"), manifest.as_bytes())?;
     write(&unfinished.join("joints.csv"), extracted.stops.to_csv().as_bytes())?;
@@ -125,8 +127,13 @@ fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extract
         }
     };
     manifest.mcap = None;
-    extracted.notices.extend(settle_unit(&mut manifest, &extracted.stops, recording, &written));
+    let is_stated = known && manifest.joint_unit.is_some();
+    extracted.notices.extend(settle_unit(&mut manifest, extracted.joint_unit, recording, &written));
     fill_camera(&mut manifest, extracted.camera_info.as_ref());
+    if extracted.is_unit_in_doubt && !is_stated {
+        // Nobody knows: the folder is refused until someone states it.
+        manifest.joint_unit = None;
+    }
     let text = manifest.to_toml()?;
     let stays = |line: &&str| known || !line.starts_with("camera_mount");
     Ok(text.lines().filter(stays).map(|line| format!("{line}\n")).collect())

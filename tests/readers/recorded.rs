@@ -305,3 +305,19 @@ fn a_folder_written_as_a_recording_reads_back_the_same() {
     ];
     assert_eq!(counts, expected.map(|(t, n)| (t.to_string(), n)).into());
 }
+
+/// A dot in the name of a rosbag2 folder begins no ending.
+#[test]
+fn a_folder_with_a_dot_in_its_name_has_the_manifest_of_its_whole_name() {
+    let folder = recorded("run1.2.toml", MANIFEST);
+    let bag = folder.path().join("run1.2");
+    fs::create_dir(&bag).unwrap();
+    for file in fs::read_dir(recording("mono8")).unwrap().map(|file| file.unwrap().path()) {
+        fs::copy(&file, bag.join(file.file_name().unwrap())).unwrap();
+    }
+    let series = read(&bag).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(series.name, "run1.2");
+    assert_eq!(series.manifest_file(), folder.path().join("run1.2.toml"));
+    fs::rename(folder.path().join("run1.2.toml"), folder.path().join("run1.toml")).unwrap();
+    assert_eq!(read(&bag).unwrap_err().code, Code::SeriesMissing);
+}

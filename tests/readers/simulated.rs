@@ -9,7 +9,7 @@ use mcap::records::MessageHeader;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use robotcal::error::Code;
-use robotcal::series::{Clock, Extracted, Motion, RecordingOptions, extract};
+use robotcal::series::{AngleUnit, Clock, Extracted, Motion, RecordingOptions, convert_recording, extract};
 use tempfile::TempDir;
 
 const START_S: f64 = 1_700_000_000.0;
@@ -111,15 +111,34 @@ struct Times {
     delay_s: f64,
     /// The clock that stamps the joints is so much behind that of images and recording, s.
     behind_s: f64,
+    joints: Joints,
 }
 
+/// How joints are written.
+#[derive(Clone, Copy)]
+struct Joints {
+    /// A radian in the unit of the readings.
+    radian: f64,
+    /// Noise to either side, rad.
+    noise_rad: f64,
+    /// Begin and end of the time in which the second joint cannot be read, s.
+    unread: [f64; 2],
+}
+
+const RADIANS: Joints = Joints { radian: 1.0, noise_rad: 0.0, unread: [0.0; 2] };
+
 /// Joints at 125 Hz, and images.
-fn write(path: &Path, arm: &Arm, Times { step_s, delay_s, behind_s }: Times, random: &mut ChaCha8Rng) {
+fn write(path: &Path, arm: &Arm, Times { step_s, delay_s, behind_s, joints }: Times, random: &mut ChaCha8Rng) {
     let mut messages: BTreeMap<(u64, u16), Vec<u8>> = BTreeMap::new();
     let ns = |t: f64| ((START_S + t) * 1e9) as u64;
     for k in 0..(arm.end() / 0.008) as u32 {
         let t = f64::from(k) * 0.008;
-        messages.insert((ns(t), 0), Cdr::new(ns(t - behind_s)).joint_state(arm.joints(t)));
+        let noise = joints.noise_rad * f64::from(k * 7919 % 3) - joints.noise_rad;
+        let mut q = arm.joints(t).map(|q| joints.radian * (q + noise));
+        if (joints.unread[0]..joints.unread[1]).contains(&t) {
+            q[1] = f64::NAN;
+        }
+        messages.insert((ns(t), 0), Cdr::new(ns(t - behind_s)).joint_state(q));
     }
     for k in 0..(arm.end() / step_s) as u32 {
         // Cameras are not punctual.
@@ -150,7 +169,7 @@ struct Recorded {
 
 impl Recorded {
     fn new(seed: u64, step_s: f64, delay_s: f64) -> Self {
-        Self::at(seed, Times { step_s, delay_s, behind_s: 0.0 })
+        Self::at(seed, Times { step_s, delay_s, behind_s: 0.0, joints: RADIANS })
     }
 
     fn at(seed: u64, times: Times) -> Self {
@@ -230,7 +249,7 @@ fn a_given_delay_is_taken_as_it_is() {
 #[test]
 fn stamps_of_two_clocks_are_told_by_arrival_and_motion() {
     for (seed, behind_s) in [(51, 3.0), (52, -3.0), (53, 5.0)] {
-        let recorded = Recorded::at(seed, Times { step_s: 0.066, delay_s: 0.0, behind_s });
+        let recorded = Recorded::at(seed, Times { step_s: 0.066, delay_s: 0.0, behind_s, joints: RADIANS });
         let extracted = recorded.extract(&RecordingOptions::default());
         let late = extracted.late.unwrap();
         assert!((late.delay_s - behind_s).abs() < (4.0 * late.sigma_s).max(0.004), "{late:?} {behind_s}");
@@ -243,7 +262,7 @@ fn stamps_of_two_clocks_are_told_by_arrival_and_motion() {
 /// nobody knows.
 #[test]
 fn of_stamps_that_arrival_contradicts_no_image_is_of_another_stop() {
-    let seldom = |seed, behind_s| Recorded::at(seed, Times { step_s: 0.3, delay_s: 0.0, behind_s });
+    let seldom = |seed, behind_s| Recorded::at(seed, Times { step_s: 0.3, delay_s: 0.0, behind_s, joints: RADIANS });
     let little = seldom(61, 0.3);
     let extracted = little.extract(&RecordingOptions::default());
     let codes: Vec<Code> = extracted.notices.iter().map(|n| n.code).collect();
@@ -294,4 +313,54 @@ fn damage_costs_the_stops_of_its_own_chunk_alone() {
     }
     println!("at least {least} of {all} stops in {} damaged recordings", chunks.len());
     assert!(least >= STOPS - 2);
+}
+
+fn with_joints(joints: Joints) -> Recorded {
+    Recorded::at(61, Times { step_s: 0.066, delay_s: 0.0, behind_s: 0.0, joints })
+}
+
+/// Speeds are those of radians, whatever the unit; where none is stated, degrees are named.
+#[test]
+fn a_robot_that_reads_degrees_stands_still_as_one_that_reads_radians() {
+    let noisy = |radian| with_joints(Joints { radian, noise_rad: 1e-4, ..RADIANS });
+    let (degrees, radians) = (noisy(1f64.to_degrees()), noisy(1.0));
+    let stated = RecordingOptions { joint_unit: Some(AngleUnit::Deg), ..as_stamped() };
+    let (got, wanted) = (degrees.extract(&stated), radians.extract(&as_stamped()));
+    assert_eq!((got.joint_unit, wanted.joint_unit), (AngleUnit::Deg, AngleUnit::Rad));
+    assert!(!got.is_unit_in_doubt && !wanted.is_unit_in_doubt);
+    assert_eq!(got.stops.stops.len(), wanted.stops.stops.len());
+    for (a, b) in got.stops.stops.iter().zip(&wanted.stops.stops) {
+        assert_eq!(a.image, b.image);
+        for (a, b) in a.raw_readings.iter().flatten().zip(b.raw_readings.iter().flatten()) {
+            assert!((a - b.to_degrees()).abs() < 1e-9, "{a} deg {b} rad");
+        }
+    }
+    let images = degrees.folder.path().join("none");
+    let error = extract(&degrees.path, &images, &as_stamped()).unwrap_err();
+    assert_eq!(error.code, Code::DegreesAsRadians, "{error}");
+}
+
+/// Noise-free degrees are slow enough where the robot stands: what is made of them states no unit.
+#[test]
+fn degrees_of_which_nobody_says_so_are_not_written_as_radians() {
+    let degrees = with_joints(Joints { radian: 1f64.to_degrees(), ..RADIANS });
+    let folder = degrees.folder.path().join("converted");
+    let extracted = convert_recording(&degrees.path, &folder, &as_stamped()).unwrap();
+    assert!(extracted.notices.iter().any(|n| n.code == Code::DegreesAsRadians), "{:?}", extracted.notices);
+    assert!(!std::fs::read_to_string(folder.join("series.toml")).unwrap().contains("joint_unit"));
+}
+
+/// The second joint is not read while the robot comes to a stop: what it read before is not what it reads there.
+#[test]
+fn images_are_not_used_while_a_joint_is_not_read() {
+    let (from, ..) = with_joints(RADIANS).arm.stops[6];
+    let recorded = with_joints(Joints { unread: [from - 0.15, from + 0.3], ..RADIANS });
+    let extracted = recorded.extract(&as_stamped());
+    assert!(extracted.notices.iter().any(|n| n.code == Code::JointSilent), "{:?}", extracted.notices);
+    for (stop, report) in extracted.stops.stops.iter().zip(&extracted.reports) {
+        let (q, t) = (stop.raw_readings.as_ref().unwrap(), stop.time_s.unwrap() - START_S);
+        let off = recorded.arm.joints(t)[1] - q[1];
+        assert!(off.abs() < 1e-3 && report.nearest_sample_s < 0.02, "{}: {off} rad", stop.image);
+        assert!(!(from - 0.14..from + 0.28).contains(&t), "{}", stop.image);
+    }
 }

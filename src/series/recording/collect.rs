@@ -30,7 +30,7 @@ pub struct StopReport {
     pub image: String,
     /// Largest joint speed at its stamp, rad/s or m/s.
     pub speed: f64,
-    /// From its stamp to the nearest joint sample, s.
+    /// From its stamp to the nearest sample of the joint whose samples are furthest, s.
     pub nearest_sample_s: f64,
     /// Pictures that were looked at.
     pub pictures: usize,
@@ -58,6 +58,8 @@ pub(super) struct Collector<'a> {
     images: &'a Path,
     options: &'a RecordingOptions,
     postures: &'a [Posture],
+    /// What the positions of the postures were multiplied by.
+    factors: &'a [f64],
     /// Memory of the pictures that wait, bytes.
     held: usize,
     taken: Taken,
@@ -78,10 +80,15 @@ impl Taken {
 }
 
 impl<'a> Collector<'a> {
-    pub fn new(groups: Vec<Group>, images: &'a Path, options: &'a RecordingOptions, postures: &'a [Posture]) -> Self {
+    pub fn new(
+        groups: Vec<Group>,
+        images: &'a Path,
+        options: &'a RecordingOptions,
+        (postures, factors): (&'a [Posture], &'a [f64]),
+    ) -> Self {
         let stop_of = groups.iter().enumerate().flat_map(|(i, g)| g.iter().map(move |t| (*t, i))).collect();
         let open = groups.iter().map(|g| Open { waiting: g.len(), ..Open::default() }).collect();
-        Self { stop_of, open, images, options, postures, held: 0, taken: Taken::default() }
+        Self { stop_of, open, images, options, postures, factors, held: 0, taken: Taken::default() }
     }
 
     pub fn take(&mut self, message: &Message<'_>) -> Result<()> {
@@ -174,7 +181,7 @@ impl<'a> Collector<'a> {
         let stop = SeriesStop {
             path: Some(self.images.join(&image)),
             image: image.clone(),
-            raw_readings: Some(joints.positions),
+            raw_readings: Some(joints.positions.iter().zip(self.factors).map(|(q, factor)| q / factor).collect()),
             placement: DEFAULT_PLACEMENT.to_string(),
             time_s: Some(time as f64 * 1e-9),
             ..SeriesStop::default()

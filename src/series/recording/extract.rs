@@ -9,9 +9,10 @@ use super::messages::CameraInfo;
 use super::motion::{Posture, Standstill, interpolate, postures, standstills};
 use super::options::{Clock, Motion, RecordingOptions};
 use super::scan::{JointReadings, Scan, scan};
-use super::silence;
+use super::silence::{self, Gaps};
+use super::unit;
 use crate::error::{Code, Error, Notice, Result};
-use crate::series::{InputFile, Stops};
+use crate::series::{AngleUnit, InputFile, Stops};
 
 /// Of a long standstill so many pictures are looked at.
 const MOST_PICTURES: usize = 9;
@@ -26,8 +27,12 @@ const NOTABLE_DELAY_S: f64 = 0.05;
 /// The stops of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extracted {
-    /// Stops with the paths of their pictures; readings in rad and m.
+    /// Stops with the paths of their pictures; readings as recorded: angles in [`Self::joint_unit`], lengths in m.
     pub stops: Stops,
+    /// Unit of the angles.
+    pub joint_unit: AngleUnit,
+    /// They count as radians and look like degrees.
+    pub is_unit_in_doubt: bool,
     /// How each stop was taken, in the same order.
     pub reports: Vec<StopReport>,
     /// Topic of the joint states; several where each joint has one of its own.
@@ -58,6 +63,13 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     times.sort_unstable();
     times.dedup();
     let mut postures = postures(&samples, &joints);
+    let joint_unit = unit::unit_of(&postures, &joints, options);
+    let seems_degrees =
+        (joint_unit == AngleUnit::Rad).then(|| unit::seem_degrees(recording, &postures, &joints, options)).flatten();
+    let factors = unit::factors(joint_unit, &joints, options);
+    for posture in &mut postures {
+        posture.positions.iter_mut().zip(&factors).for_each(|(q, factor)| *q *= factor);
+    }
     require_overlap(&scan, &postures, &times)?;
     scan.notices.extend(silence::notices(recording, &samples, &joints, &times));
     let image_delay_s = scan.delay_s(std::slice::from_ref(&image_topic)) - scan.delay_s(&topics);
@@ -69,18 +81,31 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         Some(delay_s) => Told::By(delay_s),
         None => told_by_motion(&scan, &image_topic, (&postures, &times), guess, options)?,
     };
-    if let Told::By(delay_s) | Told::Found(Delay { delay_s, .. }) = told {
-        // In the time of the images, the joints were there so much later.
-        postures.iter_mut().for_each(|p| p.time_ns += nanoseconds(delay_s));
-    }
+    // In the time of the images, the joints were there so much later.
+    let later_ns = match told {
+        Told::By(delay_s) | Told::Found(Delay { delay_s, .. }) => nanoseconds(delay_s),
+        Told::NoDelay | Told::Open => 0,
+    };
+    postures.iter_mut().for_each(|p| p.time_ns += later_ns);
+    let begin_ns = samples.iter().map(|s| s.time_ns).min().unwrap_or_default();
+    scan.notices.extend(Gaps::of(&samples, &joints).leave_out(recording, begin_ns, later_ns, &mut times));
     let late = told.late();
     scan.notices.extend(late.map(|d| d.notice(recording)));
     let growth_s = scan.delay_growth_s(&image_topic) - scan.delay_growth_s(&topics[0]);
     let is_open = told == Told::Open && options.clock == Clock::Stamp && image_delay_s.abs() > NOTABLE_DELAY_S;
     let open_s = if is_open { -image_delay_s } else { 0.0 };
-    let groups = groups(&mut scan, &postures, &times, options, nanoseconds(open_s))?;
+    let groups = groups(&mut scan, &postures, &times, options, nanoseconds(open_s)).map_err(|error| {
+        let never_still = error.code == Code::RobotNeverStill;
+        // Degrees are as many times too fast as radians.
+        seems_degrees
+            .as_ref()
+            .filter(|_| never_still)
+            .map_or(error, |n| Error::new(n.code, &n.place, &n.what, &n.remedy))
+    })?;
+    let is_unit_in_doubt = seems_degrees.is_some();
+    scan.notices.extend(seems_degrees);
     std::fs::create_dir_all(images).map_err(|e| Error::io(images, &e))?;
-    let mut collector = Collector::new(groups, images, options, &postures);
+    let mut collector = Collector::new(groups, images, options, (&postures, &factors));
     for file in scan.files.clone() {
         // Damage was told of by the first pass.
         for_each(&file, |message| if message.topic == image_topic { collector.take(&message) } else { Ok(()) })?;
@@ -125,6 +150,8 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let (stops, reports) = taken.rows.into_values().unzip();
     Ok(Extracted {
         stops: Stops { joints, stops, ..Stops::default() },
+        joint_unit,
+        is_unit_in_doubt,
         reports,
         image_delay_s,
         late,
@@ -341,7 +368,11 @@ fn no_stop(place: &str, postures: &[Posture], [standstills, short]: [usize; 2], 
         "the robot never stands still for {} s (joints slower than {} rad/s; a joint state comes every {step_s:.3} s){less}",
         options.least_still_s, options.still_speed
     );
-    let remedy = "stop the robot for each image; images in motion are taken only on demand (--in-motion SECONDS)";
+    let remedy = if 2.0 * step_s > options.least_still_s {
+        "record joint states more often, ten times a second or more: so few of them do not tell when the robot stands"
+    } else {
+        "stop the robot for each image; images in motion are taken only on demand (--in-motion SECONDS)"
+    };
     Error::new(Code::RobotNeverStill, place, what, remedy)
 }
 
@@ -369,7 +400,7 @@ mod tests {
         for (hundredths, moves) in stands_and_moves {
             for _ in 0..*hundredths {
                 let time_ns = postures.len() as i64 * 10_000_000;
-                postures.push(Posture { time_ns, positions: vec![position] });
+                postures.push(Posture { time_ns, positions: vec![position], oldest_ns: 0 });
                 position += if *moves { 0.01 } else { 0.0 };
             }
         }

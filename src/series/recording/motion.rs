@@ -6,7 +6,10 @@ use super::scan::JointSample;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Posture {
     pub time_ns: i64,
+    /// rad or m.
     pub positions: Vec<f64>,
+    /// How long before its time the position was read that is the oldest, ns.
+    pub oldest_ns: i64,
 }
 
 /// A time without motion.
@@ -17,7 +20,7 @@ pub(super) struct Standstill {
 }
 
 /// Speed is taken over this time to either side, so that the encoder's last digit is no motion, ns.
-const WINDOW_NS: i64 = 50_000_000;
+pub(super) const WINDOW_NS: i64 = 50_000_000;
 /// Without a sample for this long nobody knows whether the robot moved, ns.
 pub(super) const LONGEST_GAP_NS: i64 = 1_000_000_000;
 /// Two standstills at the same posture that are interrupted for less than this are one, ns.
@@ -44,10 +47,14 @@ pub(super) fn postures(samples: &[JointSample], joints: &[String]) -> Vec<Postur
             let (position, time_ns) = (*slot)?;
             (sample.time_ns.saturating_sub(time_ns) <= LONGEST_GAP_NS).then_some(position)
         };
+        let read = last.iter().flatten().map(|(_, time_ns)| *time_ns).min();
+        let oldest_ns = read.map_or(0, |time_ns| sample.time_ns.saturating_sub(time_ns));
         let Some(positions) = last.iter().map(known).collect::<Option<Vec<f64>>>().filter(|_| new) else { continue };
         match postures.last_mut() {
-            Some(previous) if previous.time_ns == sample.time_ns => previous.positions = positions,
-            _ => postures.push(Posture { time_ns: sample.time_ns, positions }),
+            Some(previous) if previous.time_ns == sample.time_ns => {
+                (previous.positions, previous.oldest_ns) = (positions, oldest_ns);
+            }
+            _ => postures.push(Posture { time_ns: sample.time_ns, positions, oldest_ns }),
         }
     }
     postures
@@ -106,7 +113,7 @@ pub(super) struct Interpolated {
     pub positions: Vec<f64>,
     /// Largest joint speed there, rad/s or m/s.
     pub speed: f64,
-    /// From the nearest sample, ns.
+    /// From the nearest sample of the joint whose samples are furthest, ns.
     pub nearest_ns: i64,
 }
 
@@ -130,7 +137,7 @@ pub(super) fn interpolate(postures: &[Posture], time_ns: i64) -> Option<Interpol
     Some(Interpolated {
         positions,
         speed: speed(postures, nearest),
-        nearest_ns: (time_ns - postures[nearest].time_ns).abs(),
+        nearest_ns: (time_ns - postures[nearest].time_ns).abs() + postures[nearest].oldest_ns,
     })
 }
 
@@ -164,7 +171,8 @@ mod tests {
             .map(|i| {
                 let t = f64::from(i) * 0.01;
                 let noise = 2e-5 * f64::from((i * 7919) % 3 - 1);
-                Posture { time_ns: i64::from(i) * 10 * MS, positions: vec![position(t) + noise, 1.0 - noise] }
+                let positions = vec![position(t) + noise, 1.0 - noise];
+                Posture { time_ns: i64::from(i) * 10 * MS, positions, oldest_ns: 0 }
             })
             .collect()
     }
@@ -212,8 +220,9 @@ mod tests {
         };
         let samples = [sample(30, "a", 3.0), sample(10, "a", 1.0), sample(20, "b", 2.0), sample(40, "c", 4.0)];
         let joints = ["a".to_string(), "b".to_string()];
-        let got: Vec<_> = postures(&samples, &joints).into_iter().map(|p| (p.time_ns, p.positions)).collect();
-        assert_eq!(got, [(20, vec![1.0, 2.0]), (30, vec![3.0, 2.0])]);
+        let got: Vec<_> =
+            postures(&samples, &joints).into_iter().map(|p| (p.time_ns, p.positions, p.oldest_ns)).collect();
+        assert_eq!(got, [(20, vec![1.0, 2.0], 10), (30, vec![3.0, 2.0], 10)]);
         // One that falls silent may have moved.
         let silent =
             [samples.to_vec(), vec![sample(20 + LONGEST_GAP_NS, "a", 5.0), sample(21 + LONGEST_GAP_NS, "a", 5.0)]];

@@ -1,5 +1,8 @@
 //! What may be chosen when a recording is read.
 
+use crate::series::AngleUnit;
+use crate::urdf::{Chain, JointKind};
+
 /// Which time of a message counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -41,6 +44,10 @@ pub enum Picking {
 pub struct RecordingOptions {
     /// Joints whose readings are needed; empty: all of the topic.
     pub joints: Vec<String>,
+    /// Those of them that slide, where the robot is known: their readings are in m whatever the unit of angles.
+    pub prismatic: Vec<String>,
+    /// Unit of the angles where it is stated; else rad, in which ROS has them.
+    pub joint_unit: Option<AngleUnit>,
     /// Topic of the joint states; needed when there are several.
     pub joint_topic: Option<String>,
     /// Topic of the images; needed when there are several.
@@ -63,6 +70,8 @@ impl Default for RecordingOptions {
     fn default() -> Self {
         Self {
             joints: Vec::new(),
+            prismatic: Vec::new(),
+            joint_unit: None,
             joint_topic: None,
             image_topic: None,
             clock: Clock::Stamp,
@@ -73,5 +82,15 @@ impl Default for RecordingOptions {
             still_speed: 5e-3,
             least_still_s: 0.3,
         }
+    }
+}
+
+impl RecordingOptions {
+    /// The same for the joints of a chain.
+    #[must_use]
+    pub fn of_chain(self, chain: &Chain) -> Self {
+        let kinds = chain.readings.iter().zip(&chain.reading_kinds);
+        let slides = kinds.filter(|(_, kind)| **kind == JointKind::Prismatic);
+        Self { joints: chain.readings.clone(), prismatic: slides.map(|(joint, _)| joint.clone()).collect(), ..self }
     }
 }
