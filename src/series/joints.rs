@@ -105,6 +105,7 @@ impl Stops {
 
     fn from_table(table: &Table) -> Result<Self> {
         let columns = Columns::of(table)?;
+        columns.refuse_text(table)?;
         let mut seen: BTreeMap<String, u64> = BTreeMap::new();
         let mut stops = Vec::new();
         for row in table.rows() {
@@ -173,6 +174,26 @@ impl Columns {
         let joints = others.into_iter().filter(|&c| !RESERVED.contains(&table.headers[c].as_str())).collect();
         let (time, temperature) = (table.column("time_s"), table.column(TEMPERATURE));
         Ok(Self { key, name, placement, time, temperature, torques, joints })
+    }
+
+    /// A column without a single number is a remark, and no joint.
+    fn refuse_text(&self, table: &Table) -> Result<()> {
+        let is_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
+        let written = |c: usize| table.rows().map(move |row| row.cell(c)).filter(|cell| !cell.is_empty());
+        let is_text = |c: &&usize| written(**c).nth(1).is_some() && !written(**c).any(is_number);
+        match self.joints.iter().find(is_text) {
+            // Where no column has any, the file is another one.
+            Some(&text) if self.joints.iter().any(|&c| written(c).any(is_number)) => {
+                let what = format!(
+                    "column \"{}\" is text (\"{}\"): every column but {} is a joint",
+                    table.headers[text],
+                    written(text).next().unwrap_or_default(),
+                    RESERVED.join(", ")
+                );
+                Err(Error::new(Code::CsvNumber, table.place_of_header(), what, "remove the column"))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn stop(&self, table: &Table, row: Row<'_>) -> Result<SeriesStop> {

@@ -106,6 +106,12 @@ impl Table {
             self.headers = record.iter().map(str::to_string).collect();
             return self.check_headers();
         }
+        let semicolons = record.iter().filter(|cell| cell.contains(';')).count();
+        // Decimal commas may make as many cells as there are names.
+        if semicolons > 1 || (semicolons > 0 && record.len() != self.headers.len()) {
+            let what = "its columns are separated by semicolons, under names that are separated by commas";
+            return Err(Error::new(Code::CsvSeparator, self.place_of_line(line), what, OTHER_SEPARATOR));
+        }
         if record.len() != self.headers.len() {
             let remark = [(1, self.headers.first().map(String::as_str)), (line, record.get(0))];
             if let Some((line, _)) = remark.into_iter().find(|(_, cell)| cell.is_some_and(|c| c.starts_with('#'))) {
@@ -228,10 +234,18 @@ impl Table {
     }
 }
 
+const OTHER_SEPARATOR: &str = "save it with commas between columns and decimal points (spreadsheet language: English)";
+
 /// A table separated by semicolons or tabs is named as such instead of read as one column.
 fn refuse_other_separators(file: &str, text: &str) -> Result<()> {
     let mut lines = text.lines();
     let first = lines.next().unwrap_or_default();
+    // A line by which spreadsheets tell each other of the separator.
+    if first.trim_start_matches('\u{feff}').trim().to_lowercase().starts_with("sep=") {
+        let remedy = "remove the first line, and separate columns by commas: the first line names the columns";
+        let what = "its first line names a separator, and no columns";
+        return Err(Error::new(Code::CsvSeparator, format!("{file}:1"), what, remedy));
+    }
     let (separator, name) = match (first.contains(','), first.contains(';'), first.contains('\t')) {
         (false, true, _) => (';', "semicolons"),
         (false, _, true) => ('\t', "tabs"),
@@ -241,8 +255,7 @@ fn refuse_other_separators(file: &str, text: &str) -> Result<()> {
         lines.any(|l| l.split(separator).any(|c| c.contains(',') && c.replace(',', ".").trim().parse::<f64>().is_ok()));
     let decimal = if comma { " and its numbers have a decimal comma" } else { "" };
     let what = format!("its columns are separated by {name}{decimal}");
-    let remedy = "save it with commas between columns and decimal points (spreadsheet language: English)";
-    Err(Error::new(Code::CsvSeparator, format!("{file}:1"), what, remedy))
+    Err(Error::new(Code::CsvSeparator, format!("{file}:1"), what, OTHER_SEPARATOR))
 }
 
 /// Text of a table; cells are quoted where needed.

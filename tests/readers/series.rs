@@ -136,6 +136,14 @@ fn a_bad_joint_table_names_line_and_column() {
     let german = "image;j1;j2;x\na.png;0,1;1,25;0,5\n";
     assert_says(&with(german), Code::CsvSeparator, &["joints.csv:1", "semicolons"]);
     assert_says(&with(&german.replace(';', "\t")), Code::CsvSeparator, &["joints.csv:1", "tabs"]);
+    let mixed = "image,j1,j2,x\na.png;0,1;1,25;0,5\n";
+    assert_says(&with(mixed), Code::CsvSeparator, &["joints.csv:2"]);
+    assert_says(&with(&mixed.replace(",5", "")), Code::CsvSeparator, &["joints.csv:2"]);
+    for line in ["sep=,", "\u{feff}SEP=;"] {
+        assert_says(&with(&format!("{line}\n{JOINTS}")), Code::CsvSeparator, &["joints.csv:1"]);
+    }
+    let remarked = "image,j1,j2,x,operator\na.png,0.1,1.25,0.5,Ann\nb.png,0.2,1.5,0.5,Bob\n";
+    assert_says(&with(remarked), Code::CsvNumber, &["joints.csv:1", "\"operator\""]);
     let folder = series_with(&[]);
     fs::write(folder.path().join("joints.csv"), [0xff, 0xfe, b'i', 0]).unwrap();
     assert_says(&read(folder.path()).unwrap_err(), Code::TextEncoding, &["UTF-16", "UTF-8"]);
