@@ -6,7 +6,7 @@ use super::{
     camera_model, camera_pattern, contradicted_distances, exchanged_readings, extrapolates, few_images, focus,
     held_near_nominal, joint_noise, left_out_bodies, left_out_images, left_out_observations, length_standard, loose,
     many_left_out, marker_off, measurement_scatter, moved, no_gain, odd_image, parameter_off, plate_size, pose_step,
-    repeated_measurements, scatter, shifted_measurements, small_gain, stated_noise, tag_size, undetermined, zeros_off,
+    repeated_measurements, rounded_readings, scatter, shifted_measurements, small_gain, stated_noise, tag_size, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -62,6 +62,22 @@ pub const CHECKS: &[Check] = &[
             _ => false,
         },
         ..check("pose_step", Stage::Fit(pose_step::check))
+    },
+    Check {
+        explains: |own, other| match (own, other) {
+            (Finding::ReadingsRounded(own), Finding::JointNoiseLarge(noise)) => noise.series == own.series,
+            (Finding::ReadingsRounded(_), Finding::NoiseContradicted(noise)) => noise.is_explained_by(Weight::Gate),
+            (
+                Finding::ReadingsRounded(own),
+                Finding::Displaced(_)
+                | Finding::LooseMounting(_)
+                | Finding::FocusChange(_)
+                | Finding::BodyMoved(_)
+                | Finding::ZeroMoved(_),
+            ) => own.explains_moves(&other.quantities()),
+            _ => false,
+        },
+        ..check("rounded_readings", Stage::Fit(|a, b, s| found(rounded_readings::check(a, b, s))))
     },
     Check {
         // Another focal length looks like a plate that stands elsewhere.

@@ -31,6 +31,7 @@ use super::odd_image::OddImage;
 use super::parameter_off::ParameterOff;
 use super::plate_size::DoubtedSize;
 use super::repeated_measurements::RepeatedMeasurements;
+use super::rounded_readings::ReadingsRounded;
 use super::scatter::LargeScatter;
 use super::shifted_measurements::ShiftedMeasurements;
 use super::small_gain::SmallGain;
@@ -99,6 +100,7 @@ findings! {
     OddImage,
     ParameterOff,
     RepeatedMeasurements,
+    ReadingsRounded,
     ResidualPattern,
     ShiftedMeasurements,
     SmallGain,

@@ -84,7 +84,7 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
 }
 
 /// The reading with the largest joint noise in a series: its index, its name, and the size of the noise, rad or m.
-fn noisiest_joint(fit: &Fit, series: usize) -> Option<(usize, &str, f64)> {
+pub(super) fn noisiest_joint(fit: &Fit, series: usize) -> Option<(usize, &str, f64)> {
     let sigmas = fit.problem.joint_sigma(fit.problem.noise_of(series)).into_iter();
     let named = fit.state.robot.chain.readings.iter().map(String::as_str).zip(sigmas);
     named.enumerate().map(|(k, (name, sigma))| (k, name, sigma)).max_by(|a, b| a.2.total_cmp(&b.2))

@@ -121,12 +121,17 @@ impl Kind for BodyMoved {
 
     fn seen(&self) -> String {
         let [before, after] = &self.between;
-        let images = format!(
-            "{} images, {} to {}",
-            self.images.len(),
-            self.images.first().map_or("", String::as_str),
-            self.images.last().map_or("", String::as_str),
-        );
+        let images = if self.by_turns {
+            // Between the first and the last stand others.
+            format!("{} images ({})", self.images.len(), self.images.join(", "))
+        } else {
+            format!(
+                "{} images, {} to {}",
+                self.images.len(),
+                self.images.first().map_or("", String::as_str),
+                self.images.last().map_or("", String::as_str),
+            )
+        };
         match &self.moved {
             Moved::Plate { distance_m, angle_rad } | Moved::Camera { distance_m, angle_rad } if self.by_turns => {
                 format!(
@@ -140,10 +145,21 @@ impl Kind for BodyMoved {
                 1e3 * distance_m,
                 1e3 * angle_rad
             ),
+            Moved::Images { turn_rad, distance_m } if self.by_turns => format!(
+                "{images} are turned by {:.0} degrees, others between them are not: they fit the others when they are turned back (to {:.1} mm of the place of the camera)",
+                turn_rad.to_degrees().abs(),
+                1e3 * distance_m
+            ),
             Moved::Images { turn_rad, distance_m } => format!(
                 "are turned by {:.0} degrees between {before} and {after}: {images}, fit the others when they are turned back (to {:.1} mm of the place of the camera)",
                 turn_rad.to_degrees().abs(),
                 1e3 * distance_m
+            ),
+            Moved::Zero { kind, offset, or, .. } if self.by_turns => format!(
+                "its zero stands in two places by turns: {images} agree on {:+.3} {} from that of the others, which stand between them{}",
+                1e3 * offset,
+                kind.units()[1],
+                or.map(|body| format!(" (or {body} was turned)")).unwrap_or_default()
             ),
             Moved::Zero { kind, offset, or, .. } => format!(
                 "its zero was moved between {before} and {after}: {images}, agree on {:+.3} {} from that of the others: the joint was mastered anew, its encoder or belt slipped{}",

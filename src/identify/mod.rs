@@ -31,6 +31,7 @@ mod measure;
 mod measured_lengths;
 mod misread;
 mod mistakes;
+mod name_order;
 mod near_nominal;
 mod options;
 mod parts;

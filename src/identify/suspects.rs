@@ -1,10 +1,13 @@
 //! When readings and images do not fit: the usual mistakes, tried one by one, named where one of them explains it.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::bases;
-use super::mistakes::{mistakes_undone, shifted_rows};
+use super::mistakes::{Undone, mistakes_undone, shifted_rows};
+use super::name_order::in_other_orders;
 use crate::assess::Limits;
 use crate::diagnose::MistakeKind;
 use crate::error::Code;
@@ -65,7 +68,7 @@ impl Suspects<'_> {
     fn undone(&self, misfit: f64) -> Option<(f64, MistakeKind)> {
         let hypotheses = match self.robot.chain.pose_coordinates() {
             Some(_) => shifted_rows(&self.readings()).into(),
-            None => mistakes_undone(self.robot, &self.readings()),
+            None => [mistakes_undone(self.robot, &self.readings()), self.in_other_orders()].concat(),
         };
         let partly = self.partly_shifted(misfit);
         let is_partly = |of: &MistakeKind| partly.iter().any(|(_, partly)| partly.is_part_of(of));
@@ -93,11 +96,30 @@ impl Suspects<'_> {
     }
 
     fn pair_otherwise(&self, image: usize, pair: &PosePair, otherwise: usize) -> Option<PosePair> {
-        let images = &self.problem.images;
-        let own = &images[image];
-        let place = images[..image].iter().filter(|i| i.series == own.series).count();
-        let tip = (*self.series[own.series].otherwise.get(otherwise)?.poses.get(place)?)?;
+        let own = &self.problem.images[image];
+        let tip = (*self.series[own.series].otherwise.get(otherwise)?.poses.get(self.place(image))?)?;
         Some(PosePair::of_flange(own.mount, tip, pair.camera_from_plate))
+    }
+
+    /// Place of an image among the stops of its series.
+    fn place(&self, image: usize) -> usize {
+        let images = &self.problem.images;
+        images[..image].iter().filter(|i| i.series == images[image].series).count()
+    }
+
+    /// The readings by another order of the names of the images, where these are of one series.
+    fn in_other_orders(&self) -> Vec<Undone> {
+        let of = |i: usize| self.problem.images[i].series;
+        let Some(series) =
+            self.pairs.first().map(|(i, _)| of(*i)).filter(|s| self.pairs.iter().all(|(i, _)| of(*i) == *s))
+        else {
+            return Vec::new();
+        };
+        let placed = |(readings, mistake): (BTreeMap<usize, Vec<f64>>, MistakeKind)| {
+            let of_images = self.pairs.iter().map(|(i, _)| readings.get(&self.place(*i)).cloned());
+            Some((of_images.collect::<Option<Vec<_>>>()?, mistake))
+        };
+        in_other_orders(&self.series[series]).into_iter().filter_map(placed).collect()
     }
 
     pub fn readings(&self) -> Vec<Vec<f64>> {

@@ -353,3 +353,66 @@ fn images_that_are_turned_are_no_moved_camera() {
         assert!((turn - std::f64::consts::PI).abs() < 1e-9, "{told:?}");
     }
 }
+
+/// Every third picture is turned: the list is of these, as the others stand between the first and the last of them.
+#[test]
+fn images_that_are_turned_among_others_are_listed_one_by_one() {
+    let mut made = seen(CameraMount::Hand, 24, 3);
+    let [cx, cy] = [2, 3].map(|k| made.truth.camera.parameters[k]);
+    for image in made.observations.iter_mut().step_by(3) {
+        image.observations.iter_mut().for_each(|o| o.uv = [2.0 * cx - o.uv[0], 2.0 * cy - o.uv[1]]);
+    }
+    let series = measured(&made, &chain());
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let said = match identify(chain(), std::slice::from_ref(&series), &options) {
+        Err(refusal) => {
+            assert_eq!(refusal.code, Code::ImagesTurned, "{refusal}");
+            refusal.what
+        }
+        Ok(solution) => {
+            let found = solution.findings.iter().find(|f| f.code() == Code::ImagesTurned);
+            found.unwrap_or_else(|| panic!("{:?}", solution.findings)).seen()
+        }
+    };
+    for (k, stop) in series.stops.iter().enumerate() {
+        assert_eq!(said.contains(&stop.image), k % 3 == 0, "{}: {said}", stop.image);
+    }
+}
+
+/// Whole degrees are a noise of 5 mrad: nothing moved.
+#[test]
+fn readings_in_whole_degrees_are_named_and_no_move() {
+    let made = seen(CameraMount::Hand, 40, 3);
+    let mut series = measured(&made, &chain());
+    for q in series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).flatten() {
+        *q = q.to_degrees().round().to_radians();
+    }
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let solution = identify(chain(), &[series], &options).unwrap();
+    let found = solution.findings.iter().find(|f| f.code() == Code::ReadingsRounded && f.fails());
+    let found = found.unwrap_or_else(|| panic!("{:?}", solution.findings));
+    let quantity = |name: &str| found.quantities().into_iter().find(|q| q.name == name).unwrap().value;
+    assert!((quantity("step") - 1f64.to_radians()).abs() < 1e-12);
+    assert!((quantity("joint_noise") / quantity("rounding_noise")).ln().abs() < 0.7, "{:?}", found.quantities());
+    let moves = [Code::PlateMoved, Code::CameraMoved, Code::ZeroMoved, Code::JointNoiseLarge];
+    let accused: Vec<&Finding> = solution.findings.iter().filter(|f| moves.contains(&f.code())).collect();
+    assert!(accused.is_empty(), "{accused:?}");
+    assert!(!solution.findings.iter().any(|f| matches!(f, Finding::Displaced(_))), "{:?}", solution.findings);
+}
+
+/// Names as programs sort them beside readings in the order of the stops, and the other way round.
+#[test]
+fn rows_in_the_other_order_of_their_names_are_named() {
+    let mut good = measured(&seen(CameraMount::Hand, 24, 3), &chain());
+    good.stops.iter_mut().enumerate().for_each(|(k, stop)| stop.image = format!("{}.png", k + 1));
+    let mut sorted: Vec<usize> = (0..24).collect();
+    sorted.sort_by_key(|k| good.stops[*k].image.clone());
+    for names_are_sorted in [true, false] {
+        let mut series = good.clone();
+        for (k, name) in sorted.iter().enumerate() {
+            let (row, of) = if names_are_sorted { (*name, k) } else { (k, *name) };
+            series.stops[row].readings = good.stops[of].readings.clone();
+        }
+        assert_named(&series, Code::RowsMisordered, &[]);
+    }
+}

@@ -1,0 +1,88 @@
+//! Were the readings rounded before they were written, and is that what the joint noise is?
+
+use super::joint_noise::noisiest_joint;
+use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use crate::assess::Accuracy;
+use crate::error::Code;
+use crate::fit::Fit;
+use crate::problem::Rounding;
+
+/// All readings of a series are multiples of one step, which is as large as the joint noise says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadingsRounded {
+    /// Series.
+    pub series: String,
+    /// The step.
+    pub rounding: Rounding,
+    /// Joint noise that was found, rad.
+    pub sigma_rad: f64,
+    /// Gate or note.
+    pub weight: Weight,
+}
+
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<ReadingsRounded> {
+    let limits = setting.limits;
+    let kinds = &fit.state.robot.chain.reading_kinds;
+    let of_series = |(k, of): (usize, &crate::problem::MeasuredSeries)| {
+        let (.., sigma_rad) = noisiest_joint(setting.with_noise_found(fit), k)?;
+        let rounding = Rounding::of(of, kinds).filter(|r| !of.readings_are_computed() && r.explains(sigma_rad))?;
+        let weight = match sigma_rad {
+            s if s > limits.joint_noise => Weight::Gate,
+            s if s >= limits.unusual_joint_noise => Weight::Note,
+            _ => return None,
+        };
+        Some(ReadingsRounded { series: of.name.clone(), rounding, sigma_rad, weight })
+    };
+    setting.series.iter().enumerate().filter_map(of_series).collect()
+}
+
+impl ReadingsRounded {
+    /// What moves by less than a step did not move: readings that are off by as much look the same. Where the rounding is small enough to go on,
+    /// moves are told as they are.
+    pub(super) fn explains_moves(&self, by: &[Quantity]) -> bool {
+        let is_length = |q: &&Quantity| q.unit == "m" || q.unit == "rad";
+        let mut lengths = by.iter().filter(is_length).peekable();
+        self.weight == Weight::Gate
+            && lengths.peek().is_some()
+            && lengths.all(|q| q.value.abs() < self.rounding.step_rad)
+    }
+}
+
+impl Kind for ReadingsRounded {
+    fn code(&self) -> Code {
+        Code::ReadingsRounded
+    }
+
+    fn weight(&self) -> Weight {
+        self.weight
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        vec![Subject::Series(self.series.clone())]
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![
+            Quantity::new("step", self.rounding.step_rad, "rad"),
+            Quantity::new("rounding_noise", self.rounding.sigma_rad(), "rad"),
+            Quantity::new("joint_noise", self.sigma_rad, "rad"),
+        ]
+    }
+
+    fn place(&self) -> String {
+        format!("series {}", self.series)
+    }
+
+    fn seen(&self) -> String {
+        let Rounding { step, unit, .. } = self.rounding;
+        format!(
+            "all joint readings are multiples of {step} {unit}: they were rounded, which is a noise of {:.2} mrad, and {:.2} mrad are found",
+            1e3 * self.rounding.sigma_rad(),
+            1e3 * self.sigma_rad
+        )
+    }
+
+    fn remedy(&self) -> String {
+        "write the readings with all digits that the controller has (0.001 deg or better)".into()
+    }
+}
