@@ -8,7 +8,7 @@ use clap::Args;
 use super::joint_table::{self, Unit};
 use crate::error::Result;
 use crate::output::flange_table::{at_csv, flange_at};
-use crate::output::restore::found_model;
+use crate::output::restore::{entered_offsets, exported_model};
 use crate::output::solution_json::SolutionRecord;
 use crate::output::write_beside;
 use crate::urdf::Chain;
@@ -51,7 +51,7 @@ impl AtArgs {
     /// As of [`AtArgs::table`]; a solution that does not hang together.
     pub(super) fn table_for(&self, record: &SolutionRecord) -> Result<Option<AtTable<'_>>> {
         match self.at {
-            Some(_) => self.table(&found_model(record)?.robot.chain),
+            Some(_) => self.table(&exported_model(record)?.robot.chain),
             None => Ok(None),
         }
     }
@@ -64,7 +64,7 @@ impl AtTable<'_> {
     /// A solution that does not tie robot and plate, a file that cannot be written.
     pub(super) fn run(&self, record: &SolutionRecord, folder: &Path) -> Result<String> {
         let Self { file, readings } = self;
-        let model = found_model(record)?;
+        let model = exported_model(record)?;
         let found = flange_at(&model, readings)?;
         let path = folder.join("at.csv");
         let table = at_csv(&model, readings, &found);
@@ -89,9 +89,14 @@ impl AtTable<'_> {
         }
         let _ = writeln!(
             out,
-            "at        {} joint vectors in {}; the robot is the corrected URDF with compensation.toml",
+            "at        {} joint vectors in {}; the robot is the corrected URDF with compensation.toml{}",
             found.len(),
-            path.display()
+            path.display(),
+            if entered_offsets(record)?.iter().any(|offset| *offset != 0.0) {
+                ", the readings those of the controller with the offsets of mastering.csv entered"
+            } else {
+                ""
+            }
         );
         Ok(out)
     }

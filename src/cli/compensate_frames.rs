@@ -10,7 +10,7 @@ use crate::geom::Pose;
 use crate::model::robot::Robot;
 use crate::output::corrections::{self, FramedRobot, Meant};
 use crate::output::frames_record::{self, FramesRecord, ToolKind};
-use crate::output::restore::found_model;
+use crate::output::restore::{exported_model, exported_robot};
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::programs::compensate::Compensated;
 use crate::programs::{
@@ -196,7 +196,7 @@ impl Choice {
                 .map_err(Clone::clone)),
             (_, Some(_)) => Ok(Err("base and tool of both robots count, and no common frame is given".into())),
             (_, None) => Ok(match solution(&sides.to, None)? {
-                Ok(record) => Ok(corrections::expected_errors(program, done, &found_model(&record)?)),
+                Ok(record) => Ok(corrections::expected_errors(program, done, &exported_model(&record)?)),
                 Err(why) => Err(why),
             }),
         }
@@ -221,7 +221,7 @@ fn frames_of(record: &FramesRecord) -> RobotFrames {
 
 fn framed(side: &Side, record: &FramesRecord, is_taught: bool) -> Result<Known<FramedRobot>> {
     let found = match solution(side, Some(&record.robot.solution.path))? {
-        Ok(solution) => found_model(&solution)?,
+        Ok(solution) => exported_model(&solution)?,
         Err(why) => return Ok(Err(why)),
     };
     let (robot, knowledge) = record.known(&found)?;
@@ -241,8 +241,8 @@ pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<Sol
         Err(error) if side.solution.is_some() => return Err(error),
         Err(_) => return Ok(Err(format!("{} cannot be read", path.display()))),
     };
-    let origin =
-        |name: &str| record.robot.joints.iter().find(|j| j.name == name).map(|j| Pose::from(&j.corrected_origin));
+    let exported = exported_robot(&record)?.as_exported().chain;
+    let origin = |name: &str| exported.joints.iter().find(|j| j.name == name).map(|j| j.origin);
     let chain = &side.robot.chain;
     let same = chain.readings == record.robot.readings
         && chain.tip == record.robot.tip
@@ -255,7 +255,7 @@ pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<Sol
     if same {
         return Ok(Ok(record));
     }
-    let (what, remedy) = match base_that_differs(&record, chain) {
+    let (what, remedy) = match base_that_differs(&exported, chain) {
         Some(base) => (
             format!("is of the chain from {base}, and {} was read from {}", side.urdf.display(), chain.base),
             format!("give --base {base}, from which the robot was identified"),
@@ -272,16 +272,16 @@ pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<Sol
 }
 
 /// The base of a solution of this robot, where that alone is another: one chain goes on where the other ends.
-fn base_that_differs<'r>(record: &'r SolutionRecord, chain: &Chain) -> Option<&'r str> {
-    let found = |name: &str| record.robot.joints.iter().find(|j| j.name == name);
-    let driven = || chain.joints.iter().filter(|j| j.drive.is_some());
-    let common: Vec<_> = driven().filter_map(|j| Some((j, found(&j.name)?))).collect();
+fn base_that_differs<'r>(of_record: &'r Chain, chain: &Chain) -> Option<&'r str> {
+    let found = |name: &str| of_record.joints.iter().find(|j| j.name == name);
+    let driven = |chain: &'_ Chain| chain.joints.iter().filter(|j| j.drive.is_some()).count();
+    let own = chain.joints.iter().filter(|j| j.drive.is_some());
+    let common: Vec<_> = own.filter_map(|j| Some((j, found(&j.name)?))).collect();
     let are_same = common.iter().all(|(own, other)| {
-        let (rad, m) = Pose::from(&other.corrected_origin).distance(&own.origin);
+        let (rad, m) = other.origin.distance(&own.origin);
         rad < SAME_ORIGIN && m < SAME_ORIGIN
     });
-    let of_record = record.robot.joints.iter().filter(|j| j.drive.is_some()).count();
-    let is_part = !common.is_empty() && common.len() == of_record.min(driven().count());
-    let is_other = chain.tip == record.robot.tip && chain.base != record.robot.base;
-    (is_other && is_part && are_same).then_some(record.robot.base.as_str())
+    let is_part = !common.is_empty() && common.len() == driven(of_record).min(driven(chain));
+    let is_other = chain.tip == of_record.tip && chain.base != of_record.base;
+    (is_other && is_part && are_same).then_some(of_record.base.as_str())
 }

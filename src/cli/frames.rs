@@ -11,10 +11,11 @@ use super::Verdict;
 use super::pose_argument::pose;
 use super::say::{self, say, say_line};
 use super::show::read_solution;
+use super::zeros::{ReadingsArgs, Zeros};
 use crate::assess::Limits;
 use crate::diagnose::{Mistake, Weight};
 use crate::error::{Code, Error, Notice, Result, closest_name};
-use crate::frames::{AsStated, FrameFit, Given, KnownRobot, Seen, Touches, fit};
+use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, Seen, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
 use crate::identify::{measure_bodies, touch_mistake};
 use crate::output::corrections::{FileFinding, numbers};
@@ -24,7 +25,7 @@ use crate::output::frames_record::{
     self, FILE_NAME, FORMAT, FramesRecord, KnowledgeRecord, RobotOfFrames, ToolKind, ToolRecord, TouchRecord, WorkKind,
     WorkRecord, checks, flat, rows,
 };
-use crate::output::restore::{FoundModel, chain, found_model, robot_description};
+use crate::output::restore::{FoundModel, chain, exported_model, robot_description};
 use crate::output::solution_json::SolutionRecord;
 use crate::output::work_findings::{from_below, other_frame};
 use crate::output::{ResultFolder, folder_name};
@@ -56,6 +57,8 @@ pub(super) struct FramesArgs {
     /// Frame in which the controller computes, a link fixed beside the arm (`base` of ur_description): the work object is written in it, too
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
+    #[command(flatten)]
+    readings: ReadingsArgs,
     /// Folder for frames.json, the programs and the URDF with both frames
     #[arg(long, value_name = "FOLDER", default_value = "frames")]
     out: PathBuf,
@@ -72,8 +75,10 @@ pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
     let place = ResultFolder::among(&args.out)?;
     let record = read_solution(&args.from)?;
     let description = robot_description(&record)?;
-    let found = found_model(&record)?;
+    let found = exported_model(&record)?;
     let Measured { mut touches, files, notices } = read_touches(args, &record, &description)?;
+    let zeros = args.readings.of(&record, &files)?.filter(|_| !touches.all.is_empty());
+    zeros.iter().for_each(|zeros| touches.add(&zeros.missing));
     let placement = args.plate.as_ref().map(|name| placement_named(&record, name)).transpose()?;
     let robot = found.known_robot(placement)?;
     let plate = placement.map(|p| Pose::from(&record.placements[p].pose));
@@ -93,6 +98,9 @@ pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
     let mistake = touch_mistake(&robot, &touches, &given, (&fitted, &found.limits));
     let mut findings = findings((&fitted, mistake), &touches, (&found.limits, placement), &subject);
     findings.extend(other_frame(&record.robot.base, (&fitted, &work_name(&touches)), &found.limits, &subject));
+    findings.extend(
+        zeros.as_ref().and_then(|z| other_zeros((&fitted, z), (&robot, &touches, &given), &found.limits, &subject)),
+    );
     findings.extend(from_below(robot.exported(), (&fitted, &touches), &found.limits, &subject));
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
     let made = FramesRecord {
@@ -135,6 +143,7 @@ pub(super) fn run(args: &FramesArgs) -> Result<Verdict> {
     let listed: Vec<(String, &[u8])> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
     place.write_beside(&listed, std::slice::from_ref(&args.from))?;
     say!("{}", text(args, &made, &fitted, &touches, &robot));
+    zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
     for notice in &notices {
         say_line!("note      {}", notice.coded());
     }
@@ -160,6 +169,26 @@ fn findings(
         all.extend(too_exact(fit, limits, subject));
     }
     all
+}
+
+/// The touches contradict the solution as their readings are taken, and do not the other way.
+fn other_zeros(
+    (fit, zeros): (&FrameFit, &Zeros),
+    (robot, touches, given): (&KnownRobot, &Touches, &Given),
+    limits: &Limits,
+    subject: &str,
+) -> Option<FileFinding> {
+    let mut otherwise = touches.clone();
+    otherwise.add(&zeros.instead());
+    let factor = fit.contradiction(limits);
+    let other = frames::fit(robot, &otherwise, given, limits).ok()?;
+    let (other_factor, word) = (other.contradiction(limits), zeros.other());
+    let text = format!(
+        "the touches contradict the solution {factor:.1} times as far as they may with their readings as taken, and {other_factor:.1} times as those of the controller {word} the offsets of mastering.csv were entered: say --readings {word}"
+    );
+    let quantities = numbers([("factor", factor), ("other_factor", other_factor)]);
+    let is_other = factor > limits.touch_factor && other_factor <= limits.touch_factor;
+    is_other.then(|| gate(Code::ReadingsOfOtherZeros, subject, quantities, text))
 }
 
 /// The tool is hardly known relative to the plate.

@@ -75,7 +75,7 @@ pub(super) struct IdentifyArgs {
 pub(super) enum OffsetsName {
     /// Into the origins: controller angles stay as they are
     Folded,
-    /// Into mastering.csv, for the controller; the origins are without them
+    /// Those that are determined into mastering.csv, for the controller; the origins are without them, and hold the others
     Mastering,
 }
 

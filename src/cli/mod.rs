@@ -44,6 +44,7 @@ mod verify_args;
 mod verify_series;
 mod verify_stated;
 mod verify_verdict;
+mod zeros;
 
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;

@@ -16,7 +16,7 @@ use crate::error::{Code, Error, Result, plain_name};
 use crate::frames::{KnownRobot, PlannedTouch, TouchPlan, TouchRequest, plan_touches};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
-use crate::output::restore::found_model;
+use crate::output::restore::{entered_offsets, exported_model};
 use crate::output::{ResultFolder, plan_files};
 use crate::series::{AngleUnit, CameraMount, ContactSection, Manifest, Row, Table};
 use crate::urdf::{Chain, JointKind};
@@ -59,7 +59,7 @@ pub(super) fn run(
 ) -> Result<Verdict> {
     let place = ResultFolder::claim(out, plan_files::FILE_NAME)?;
     let record = read_solution(from)?;
-    let found = found_model(&record)?;
+    let found = exported_model(&record)?;
     let robot = found.known_robot(None)?;
     let positive = |flag: &str, value: f64, most: f64| match value > 0.0 && value <= most {
         true => Ok(value),
@@ -94,6 +94,9 @@ pub(super) fn run(
     let files = files.map(|(name, text)| (name.to_owned(), text.into_bytes()));
     place.write_all(&plan_files::touch_files(files.into(), &super::command_line().join(" "))?)?;
     say!("{}", text(&planned, (&request, fewest), &robot, out));
+    if entered_offsets(&record)?.iter().any(|offset| *offset != 0.0) {
+        say_line!("readings  the joint values are those of the controller with the offsets of mastering.csv entered");
+    }
     if !unreached.is_empty() {
         let names: Vec<&str> = unreached.iter().map(|k| request.points[*k].0.as_str()).collect();
         say_line!(

@@ -113,6 +113,18 @@ fn compare(args: &ShowArgs, a: &SolutionRecord, b: &SolutionRecord) -> Result<Ve
         None => say_line!("          their stops have no region in common"),
     }
     print_difference("within all joint limits", &found.everywhere, a);
+    let apart = |(name, (zero, kind)): (&String, (&f64, &JointKind))| {
+        let [_, unit] = kind.units();
+        (*zero != 0.0).then(|| format!("{name} {:+.3} {unit}", 1e3 * zero))
+    };
+    let kinds = &a.robot.reading_kinds;
+    let zeros: Vec<String> = a.robot.readings.iter().zip(found.zeros.iter().zip(kinds)).filter_map(apart).collect();
+    if !zeros.is_empty() {
+        say_line!(
+            "zeros     the two corrected URDFs take different joint angles (mastering.csv): one posture reads {} more for the second; do not exchange them",
+            zeros.join(", ")
+        );
+    }
     if found.parameters.is_empty() {
         say_line!("differ    no parameter of the robot differs by more than 3 sigmas");
     }

@@ -200,7 +200,7 @@ fn next(r: &SolutionRecord, verdict: &Verdict, most: usize) -> Vec<String> {
 }
 
 /// Where joint offsets are not in the corrected URDF.
-const ENTER_MASTERING: &str = "enter mastering.csv in the controller first: joint offsets are not in the URDF";
+const ENTER_MASTERING: &str = "enter the offsets of mastering.csv that have in_urdf = no in the controller first, and no others: they are not in the URDF";
 
 /// Where its size stands in its file alone.
 const MEASURE_THE_PLATE: &str = "measure the plate (give [scale]): 0.1 % off its stated size is 1 mm a metre";

@@ -21,6 +21,7 @@ use crate::assess::{
 use crate::error::{Code, Error, Result};
 use crate::model::robot::Robot;
 use crate::output::compensated;
+use crate::output::restore::add;
 use crate::urdf::Chain;
 
 pub(super) fn run(args: &VerifyArgs) -> Result<Verdict> {
@@ -40,6 +41,24 @@ struct Judged {
 }
 
 impl Judged {
+    fn of(robot: Robot, points: Vec<MeasuredPoint>, file: &Path) -> Result<Self> {
+        let fit = fit_points(&robot, &points).ok_or_else(|| {
+            Error::new(
+                Code::PointsUndetermined,
+                file.display(),
+                "the points do not determine the frame of the device and the reflector",
+                "measure at least 10 points that differ in position and in hand orientation",
+            )
+        })?;
+        Ok(Self { robot, clusters: clusters(&points), points, fit })
+    }
+
+    /// With offsets added to all readings, rad or m.
+    fn with_added(mut self, offsets: &[f64], file: &Path) -> Result<Self> {
+        self.points.iter_mut().for_each(|point| add(&mut point.readings, offsets));
+        Self::of(self.robot, self.points, file)
+    }
+
     /// Number of points at different readings.
     fn different(&self) -> usize {
         self.clusters.iter().max().map_or(0, |last| last + 1)
@@ -59,10 +78,16 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     let stated = Stated::beside(&args.urdf, &model.robot);
     let limits = &Stated::limits_of(stated.as_ref());
     let device_m = point_sigma(args.point_sigma_m, limits)?;
+    let zeros = stated.as_ref().map(|s| args.readings.of(s.record(), &[])).transpose()?.flatten();
+    let model = match &zeros {
+        Some(zeros) => model.with_added(&zeros.missing, file)?,
+        None => model,
+    };
     refuse_mistaken(&model, &args.urdf, file, limits)?;
     refuse_far(&model, &args.urdf, file, limits)?;
     let count = model.points.len();
     say_line!("points    {count} of {}; frame of the device and reflector fitted", file.display());
+    zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
     say_line!("{}", line("model", &args.urdf, &model));
     let nominal = args.nominal.as_ref().map(|urdf| {
         let nominal = judged(args, (urdf, None), (file, unit))?;
@@ -136,15 +161,7 @@ fn judged(
     let chain = read_chain(urdf, args.base.as_deref(), args.tip.as_deref())?;
     let points = read_points(file, &chain, unit)?;
     let robot = compensated(chain, compensation)?;
-    let fit = fit_points(&robot, &points).ok_or_else(|| {
-        Error::new(
-            Code::PointsUndetermined,
-            file.display(),
-            "the points do not determine the frame of the device and the reflector",
-            "measure at least 10 points that differ in position and in hand orientation",
-        )
-    })?;
-    Ok(Judged { robot, clusters: clusters(&points), points, fit })
+    Judged::of(robot, points, file)
 }
 
 fn contradict((model, urdf): (&Judged, &Path), file: &Path, why: &str, remedy: &str) -> Error {

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::joint_table::Unit;
 use super::recording::RecordingArgs;
+use super::zeros::ReadingsArgs;
 
 /// Flags of `verify`.
 #[derive(Debug, Args)]
@@ -37,6 +38,8 @@ pub(super) struct VerifyArgs {
     /// Tip link
     #[arg(long, value_name = "LINK")]
     pub(super) tip: Option<String>,
+    #[command(flatten)]
+    pub(super) readings: ReadingsArgs,
     #[command(flatten)]
     pub(super) recording: RecordingArgs,
 }

@@ -19,6 +19,7 @@ use crate::identify::{
 use crate::model::robot::Robot;
 use crate::output::compensated;
 use crate::output::corrections::FileFinding;
+use crate::output::restore::add;
 use crate::problem::MeasuredSeries;
 use crate::series::InputFile;
 use crate::urdf::Chain;
@@ -34,6 +35,7 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
         require_readings(&inputs)?;
         let model = Model::of(args, inputs.chain.clone())?;
         let Observed { series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
+        let series = with_zeros(args, &model, &files, series)?;
         let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
         let images: Vec<&JudgedImage> = images.iter().collect();
         say_line!("{}", line("model", &args.urdf, &images));
@@ -48,8 +50,9 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let Observed { chain, series, files, .. } =
         nominal_inputs.with_recordings(&options)?.observe(&model.limits, &progress::of_series())?;
     let series = in_told_postures(&model.robot, &series, &model.limits);
-    let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
     let nominal = judged((&Robot::nominal(chain), file), &series, &model.limits)?;
+    let series = with_zeros(args, &model, &files, series)?;
+    let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
     let (images, nominal) = of_both(&images, &nominal);
     let mut reasons = compare(args, (file, &model.limits), &images, &nominal)?;
     weigh(args, &mut reasons, &model, Measured { series: &series, files: &files, images: &images });
@@ -69,6 +72,21 @@ impl Model {
         let stated = Stated::beside(&args.urdf, &robot);
         Ok(Self { limits: Stated::limits_of(stated.as_ref()), stated, robot })
     }
+}
+
+/// The series with the readings of the controller to which the model belongs; says which they are taken for.
+fn with_zeros(
+    args: &VerifyArgs,
+    model: &Model,
+    files: &[InputFile],
+    mut series: Vec<MeasuredSeries>,
+) -> Result<Vec<MeasuredSeries>> {
+    let zeros = model.stated.as_ref().map(|s| args.readings.of(s.record(), files)).transpose()?.flatten();
+    let Some(zeros) = zeros else { return Ok(series) };
+    say_line!("{}", zeros.line());
+    let stops = series.iter_mut().flat_map(|s| &mut s.stops);
+    stops.filter_map(|stop| stop.readings.as_mut()).for_each(|readings| add(readings, &zeros.missing));
+    Ok(series)
 }
 
 /// What was measured, and how the model does there.

@@ -9,7 +9,7 @@ use super::show::read_solution;
 use crate::assess::{Limits, MeasuredPoint, NORMAL_95, PredictedFlange, fit_points, root_mean_square};
 use crate::model::robot::{Posture, Robot};
 use crate::output::ALONE;
-use crate::output::restore::{FoundModel, found_model};
+use crate::output::restore::{FoundModel, exported_model};
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::problem::MeasuredSeries;
 use crate::series::{InputFile, SpatialFiles};
@@ -52,7 +52,7 @@ impl Stated {
             }
             None => (of_urdf_alone(&path, urdf, robot)?, false),
         };
-        let found = found_model(&record).ok()?;
+        let found = exported_model(&record).ok()?;
         Some(Self { path, record, found, part: (!is_whole).then(|| robot.clone()) })
     }
 
@@ -120,9 +120,19 @@ impl Stated {
 
     /// Whether one of these files of measurements is an input of the solution.
     pub fn was_fitted_to(&self, files: &[InputFile]) -> bool {
-        let is_input = |file: &InputFile| self.record.inputs.iter().any(|input| input.sha256 == file.sha256);
-        files.iter().filter(|file| is_measurement(&file.path)).any(is_input)
+        was_fitted_to(&self.record, files)
     }
+
+    /// The solution.
+    pub fn record(&self) -> &SolutionRecord {
+        &self.record
+    }
+}
+
+/// Whether one of these files of measurements is an input of a solution.
+pub(super) fn was_fitted_to(record: &SolutionRecord, files: &[InputFile]) -> bool {
+    let is_input = |file: &InputFile| record.inputs.iter().any(|input| input.sha256 == file.sha256);
+    files.iter().filter(|file| is_measurement(&file.path)).any(is_input)
 }
 
 fn rms(lengths: impl Iterator<Item = f64>) -> f64 {

@@ -108,6 +108,13 @@ impl Touches {
         Ok(touches)
     }
 
+    /// Adds offsets to the readings of all postures, rad or m.
+    pub fn add(&mut self, offsets: &[f64]) {
+        for posture in &mut self.postures {
+            posture.readings.iter_mut().zip(offsets).for_each(|(reading, offset)| *reading += offset);
+        }
+    }
+
     /// True where the orientation of a body was seen, too.
     pub fn is_pose(&self, body: usize) -> bool {
         self.all.iter().any(|t| t.body == body && matches!(t.seen, Seen::Pose(_)))

@@ -206,28 +206,41 @@ impl Robot {
         Self { terms, ..Self::nominal(chain) }
     }
 
-    /// This robot under a controller whose zero points have been corrected, and these corrections (added to every reading), rad or m.
-    ///
-    /// Offsets are gone; the terms are those of the new readings (exact for gears and harmonics, gravity as before).
+    /// This robot under a controller whose zero points have been corrected, and these corrections (added to every reading), rad or m: no
+    /// offset is left.
     pub fn mastered(&self) -> (Self, Vec<f64>) {
-        let n = self.chain.readings.len();
-        let sum = |reading: usize, term: Term| {
-            self.terms.iter().filter(|t| t.reading == reading && t.term == term).map(|t| t.value).sum::<f64>()
-        };
+        let shifts = self.zero_corrections();
+        (self.mastered_by(&shifts), shifts)
+    }
+
+    /// What a controller has to add to every reading so that no offset is left, rad or m.
+    pub fn zero_corrections(&self) -> Vec<f64> {
         // q + offset + gear q = (q + shift)(1 + gear)
-        let shifts: Vec<f64> = (0..n).map(|r| sum(r, Term::Offset) / (1.0 + sum(r, Term::Gear))).collect();
+        let of = |r: usize| self.sum_of(r, Term::Offset) / (1.0 + self.sum_of(r, Term::Gear));
+        (0..self.chain.readings.len()).map(of).collect()
+    }
+
+    /// This robot under a controller that adds `shifts` (rad or m) to its readings. What of the offsets they do not take stays an offset; the
+    /// terms are those of the new readings (exact for gears and harmonics, gravity as before), in their order.
+    pub fn mastered_by(&self, shifts: &[f64]) -> Self {
         let mut robot = self.clone();
-        robot.terms.retain(|t| t.term != Term::Offset);
         for t in &mut robot.terms {
-            let turned = |k: u8| (f64::from(k) * shifts[t.reading]).sin_cos();
+            let (reading, shift) = (t.reading, shifts[t.reading]);
+            let turned = |k: u8| (f64::from(k) * shift).sin_cos();
             // a cos k(q - s) + b sin k(q - s), sorted by cos kq and sin kq.
             t.value = match t.term {
-                Term::Cosine(k) => turned(k).1 * t.value - turned(k).0 * sum(t.reading, Term::Sine(k)),
-                Term::Sine(k) => turned(k).1 * t.value + turned(k).0 * sum(t.reading, Term::Cosine(k)),
+                Term::Offset => t.value - shift * (1.0 + self.sum_of(reading, Term::Gear)),
+                Term::Cosine(k) => turned(k).1 * t.value - turned(k).0 * self.sum_of(reading, Term::Sine(k)),
+                Term::Sine(k) => turned(k).1 * t.value + turned(k).0 * self.sum_of(reading, Term::Cosine(k)),
                 _ => t.value,
             };
         }
-        (robot, shifts)
+        robot
+    }
+
+    /// Sum of the terms of one kind of a reading.
+    fn sum_of(&self, reading: usize, term: Term) -> f64 {
+        self.terms.iter().filter(|t| t.reading == reading && t.term == term).map(|t| t.value).sum()
     }
 
     /// True position of every joint of the chain, and the basis function of every term.

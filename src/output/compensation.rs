@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::Context;
-use super::controller_files::{exported, offsets_in_words};
+use super::controller_files::offsets_in_words;
+use super::mastering::exported;
 use super::text::{key, list, number};
 use crate::geom::Pose;
 use crate::identify::Solution;

@@ -29,7 +29,7 @@ pub struct Context<'a> {
 pub enum Offsets {
     /// Into the origins: controller angles stay as they are.
     Folded,
-    /// Into the mastering table of the controller; the origins are without them.
+    /// Those that are determined into the mastering table of the controller; the origins are without them, and hold the others.
     Mastering,
 }
 

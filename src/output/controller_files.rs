@@ -1,4 +1,4 @@
-//! The corrected robot for those who read no URDF: xacro properties, joint offsets for the controller, a table of MDH parameters.
+//! The corrected robot for those who read no URDF: xacro properties, a table of MDH parameters.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -6,25 +6,11 @@ use rand_chacha::ChaCha8Rng;
 use super::text::number;
 use super::{Context, Offsets};
 use crate::geom::Pose;
-use crate::identify::Solution;
 use crate::model::inverse;
 use crate::model::mdh::{Mdh, Unfit};
 use crate::model::robot::Robot;
 use crate::series::to_csv;
 use crate::urdf::{Chain, JointKind};
-
-/// The robot as the files of this result describe it: offsets folded into origins, or left to the controller.
-pub(super) fn exported(solution: &Solution, context: &Context) -> Robot {
-    of_controller(&solution.fit.state.robot, context)
-}
-
-/// A robot with its offsets folded into origins, or left to the controller.
-pub(super) fn of_controller(robot: &Robot, context: &Context) -> Robot {
-    match context.offsets {
-        Offsets::Folded => robot.clone(),
-        Offsets::Mastering => robot.mastered().0,
-    }
-}
 
 /// How offsets are dealt with, as a sentence for the head of a file.
 pub(super) fn offsets_in_words(context: &Context) -> &'static str {
@@ -32,7 +18,9 @@ pub(super) fn offsets_in_words(context: &Context) -> &'static str {
         Offsets::Folded => {
             "Joint offsets are folded in: controller angles stay as they are, and mastering must not be changed."
         }
-        Offsets::Mastering => "Joint offsets are NOT in here: enter those of mastering.csv in the controller first.",
+        Offsets::Mastering => {
+            "Joint offsets that mastering.csv has with in_urdf = no are NOT in here: enter them, and no others, in the controller first."
+        }
     }
 }
 
@@ -76,55 +64,6 @@ pub fn kinematics_xacro(robot: &Robot, note: &str) -> String {
         out += &format!("  <xacro:property name=\"{name}_origin_rpy\" value=\"{}\"/>\n", list(origin.rpy()));
     }
     out + "</robot>\n"
-}
-
-/// Sigma of an offset that is worth entering whatever the offset is: half a millimetre at a metre.
-const USEFUL_SIGMA_RAD: f64 = 0.5e-3;
-const USEFUL_SIGMA_M: f64 = 0.05e-3;
-/// Sigmas by which a less well known offset must differ from none.
-const LEAST_SIGMAS: f64 = 2.0;
-
-/// An offset that the data decide (they say at least as much as the tolerance that was assumed), and whose entry makes the
-/// robot better: known well, or far larger than its sigma.
-fn is_determined(offset: f64, sigma: f64, prior: f64, prismatic: bool) -> bool {
-    let useful = if prismatic { USEFUL_SIGMA_M } else { USEFUL_SIGMA_RAD };
-    sigma < 0.5 * prior && (sigma <= useful || offset.abs() > LEAST_SIGMAS * sigma)
-}
-
-/// Joint offsets for the controller: one row for every joint.
-pub(super) fn mastering_csv(solution: &Solution, context: &Context) -> String {
-    let robot = &solution.fit.state.robot;
-    let offsets = robot.mastered().1;
-    let mut rows = vec![["joint", "offset", "sigma", "unit", "determined", "in_urdf"].map(String::from).to_vec()];
-    for (reading, name) in robot.chain.readings.iter().enumerate() {
-        let prismatic = robot.chain.reading_kinds[reading] == JointKind::Prismatic;
-        let (unit, factor) = if prismatic { ("mm", 1e3) } else { ("deg", 1f64.to_degrees()) };
-        let column = solution.fit.problem.layout.find(&format!("robot/{name}.offset"));
-        let sigma = column.map_or(f64::NAN, |c| solution.fit.covariance.reduced[(c, c)].max(0.0).sqrt());
-        let prior = column.map_or(f64::NAN, |c| solution.fit.problem.layout.columns[c].prior_sigma);
-        let is_held = column.is_none_or(|c| !solution.fit.problem.layout.columns[c].free);
-        let determined =
-            if !is_held && is_determined(offsets[reading], sigma, prior, prismatic) { "yes" } else { "no" };
-        let folded = if context.offsets == Offsets::Folded { "yes" } else { "no" };
-        let numbers = [offsets[reading], sigma].map(|v| format!("{:.6}", v * factor + 0.0));
-        let [offset, sigma] = numbers;
-        let sigma = if is_held { String::new() } else { sigma };
-        rows.push(vec![name.clone(), offset, sigma, unit.into(), determined.into(), folded.into()]);
-    }
-    let note = match context.offsets {
-        Offsets::Folded => {
-            "# They are in the corrected URDF already (in_urdf = yes): entering them in the controller as well would count them twice.\n"
-        }
-        Offsets::Mastering => {
-            "# They are not in the corrected URDF, which belongs to a controller with these offsets entered.\n"
-        }
-    };
-    format!(
-        "# Joint offsets for the mastering (zero point) table of the controller: where it shows the angle q, the joint stands at q + offset,\n\
-         # so that after the correction it has to show q + offset. Not determined (no): known only together with base, tool\n\
-         # or the origins beside it, or within twice its sigma of none and that sigma beyond 0.5 mrad (0.05 mm); leave it. Without a sigma: held, not estimated.\n{note}{}",
-        to_csv(&rows)
-    )
 }
 
 /// Postures at which the table is held against the origins.
@@ -184,19 +123,4 @@ pub(super) fn mdh_csv(robot: &Robot, note: &str) -> String {
         rows.push([vec![link.joint.clone(), kind.into()], numbers.to_vec()].concat());
     }
     out + &to_csv(&rows)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::is_determined;
-
-    #[test]
-    fn an_offset_is_determined_where_entering_it_helps() {
-        let determined = |offset: f64, sigma: f64| is_determined(offset.to_radians(), sigma.to_radians(), 10e-3, false);
-        assert!(!determined(-0.0094, 0.132), "nothing beside its sigma");
-        assert!(!determined(0.0, 0.57), "the prior alone");
-        assert!(!determined(1.5, 0.5), "far from none, but the data say too little");
-        assert!(determined(0.4, 0.13));
-        assert!(determined(0.001, 0.02), "known to be none");
-    }
 }

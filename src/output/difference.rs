@@ -1,6 +1,6 @@
 //! Two solutions against each other over the workspace.
 
-use super::restore::{FoundModel, found_model};
+use super::restore::{FoundModel, entered_offsets, found_model};
 use super::solution_json::SolutionRecord;
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::error::{Code, Error, Result};
@@ -36,11 +36,14 @@ pub struct SolutionDifference {
     pub everywhere: Difference,
     /// Parameters, largest first.
     pub parameters: Vec<Disagreement>,
+    /// What the exported files of the second expect of readings beside those of the first, rad or m: not none where offsets are entered in the
+    /// controller for one of them, and the two take different joint angles.
+    pub zeros: Vec<f64>,
     /// Joint names.
     pub joints: Vec<String>,
 }
 
-/// Compares `b` with `a` at the places of both workspace maps.
+/// Compares `b` with `a` at the places of both workspace maps, for the readings that they were identified from.
 ///
 /// # Errors
 /// Solutions of robots with different joints, or without workspace map.
@@ -69,6 +72,7 @@ pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<Solut
         covered: difference(&first, &second, &covered),
         everywhere,
         parameters: disagreements(a, b),
+        zeros: entered_offsets(b)?.iter().zip(entered_offsets(a)?).map(|(b, a)| b - a).collect(),
         joints: a.robot.readings.clone(),
     })
 }

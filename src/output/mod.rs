@@ -28,6 +28,7 @@ pub mod frames_record;
 mod gauge;
 mod image_records;
 mod kinematics_file;
+mod mastering;
 mod names;
 mod npy;
 mod observation_table;

@@ -174,7 +174,7 @@ pub fn depths_of_record(record: &SolutionRecord) -> Vec<[f64; 2]> {
 /// The model that a solution found, with its covariance.
 #[derive(Debug, Clone)]
 pub struct FoundModel {
-    /// The robot that is stated, that of the corrected URDF with compensation.toml: twists and joint terms, no local errors.
+    /// The robot that is stated: twists and joint terms, no local errors.
     pub robot: Robot,
     /// All columns, those of local errors among them.
     pub layout: Layout,
@@ -190,11 +190,8 @@ pub struct FoundModel {
     pub limits: Limits,
 }
 
-/// The model of a record.
-///
-/// # Errors
-/// A file that does not hang together.
-pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
+/// The robot of a record as its own readings drive it: offsets, twists and all joint terms.
+fn found_robot(record: &SolutionRecord) -> Result<Robot> {
     let chain = chain(record, &robot_description(record)?, &record.robot.base, &record.robot.tip)?;
     if chain.joints.len() != record.robot.joints.len() || chain.readings != record.robot.readings {
         return Err(damaged("robot and URDF text do not belong together"));
@@ -208,7 +205,53 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
             .ok_or_else(|| damaged(format!("joint term {}.{} is not known", t.reading, t.term)))
     });
     let terms = terms.collect::<Result<Vec<_>>>()?;
-    let robot = Robot { chain, twists, terms };
+    Ok(Robot { chain, twists, terms })
+}
+
+/// What the controller of the exported robot adds to the readings that the robot was identified from, rad or m; none where the corrected
+/// URDF holds all offsets.
+///
+/// # Errors
+/// A file that does not hang together.
+pub fn entered_offsets(record: &SolutionRecord) -> Result<Vec<f64>> {
+    match (record.offsets_in_mastering, record.offsets_to_enter.is_empty()) {
+        (false, _) => Ok(vec![0.0; record.robot.readings.len()]),
+        (true, false) => Ok(record.offsets_to_enter.clone()),
+        (true, true) => Ok(found_robot(record)?.zero_corrections()),
+    }
+}
+
+/// The robot that the files of a record describe, corrected URDF with compensation.toml, for the readings of the controller to which they
+/// belong: with the offsets entered that are not in them.
+///
+/// # Errors
+/// A file that does not hang together.
+pub fn exported_robot(record: &SolutionRecord) -> Result<Robot> {
+    Ok(found_robot(record)?.without_local_errors().mastered_by(&entered_offsets(record)?))
+}
+
+/// The model of a record for the readings of the controller to which its exported files belong, as of [`exported_robot`].
+///
+/// # Errors
+/// A file that does not hang together.
+pub fn exported_model(record: &SolutionRecord) -> Result<FoundModel> {
+    let (mut model, entered) = (found_model(record)?, entered_offsets(record)?);
+    model.robot = exported_robot(record)?;
+    model.stops.iter_mut().for_each(|stop| add(&mut stop.readings, &entered));
+    Ok(model)
+}
+
+/// Adds offsets to readings.
+pub fn add(readings: &mut [f64], offsets: &[f64]) {
+    readings.iter_mut().zip(offsets).for_each(|(reading, offset)| *reading += offset);
+}
+
+/// The model of a record, for the readings that it was identified from.
+///
+/// # Errors
+/// A file that does not hang together.
+pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
+    let robot = found_robot(record)?;
     let state = State {
         robot: robot.clone(),
         mountings: record.mountings.iter().map(|m| (&m.pose).into()).collect(),

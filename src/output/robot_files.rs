@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::controller_files::{self, kinematics_xacro, mdh_csv, of_controller, offsets_in_words};
+use super::controller_files::{kinematics_xacro, mdh_csv, offsets_in_words};
 use super::kinematics_file::kinematics_yaml;
 use super::names::file_part;
-use super::{Context, compensation};
+use super::{Context, compensation, mastering};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::identify::Solution;
@@ -16,11 +16,16 @@ use crate::urdf::patch_origins;
 pub(super) fn all(solution: &Solution, context: &Context) -> Result<Vec<(String, String)>> {
     let alone = solution.uncertainty.alone.as_ref();
     let note = alone.map_or("", |_| WITH_TERMS);
-    let mut files = described(&solution.fit.state.robot, "", note, context)?;
-    files.push(("mastering.csv".into(), controller_files::mastering_csv(solution, context)));
+    let mut files = described(&mastering::exported(solution, context), "", note, context)?;
+    files.push(("mastering.csv".into(), mastering::mastering_csv(solution, context)));
     files.push(("compensation.toml".into(), compensation::compensation_toml(solution, context)));
     if let Some(robot) = alone {
-        files.extend(described(robot, "_alone", BY_ITSELF, context)?);
+        files.extend(described(
+            &robot.mastered_by(&mastering::to_enter(solution, context)),
+            "_alone",
+            BY_ITSELF,
+            context,
+        )?);
     }
     Ok(files)
 }
@@ -34,16 +39,15 @@ pub const CALIBRATED: &str = ".calibrated.urdf";
 /// End of the name of the one that does best by itself.
 pub const ALONE: &str = ".calibrated_alone.urdf";
 
-/// A robot in every format that its readers take; `mark` stands in the names, `note` in the heads.
+/// A robot, as the controller has it, in every format that its readers take; `mark` stands in the names, `note` in the heads.
 fn described(robot: &Robot, mark: &str, note: &str, context: &Context) -> Result<Vec<(String, String)>> {
-    let robot = of_controller(robot, context);
     let note = [offsets_in_words(context), note].join(" ");
     let note = note.trim_end();
     Ok(vec![
-        (format!("{}.calibrated{mark}.urdf", file_part(context.robot_name)), urdf(&robot, context)?),
-        (format!("kinematics{mark}.yaml"), kinematics_yaml(&robot, context.robot, note)),
-        (format!("kinematics{mark}.xacro"), kinematics_xacro(&robot, note)),
-        (format!("mdh{mark}.csv"), mdh_csv(&robot, note)),
+        (format!("{}.calibrated{mark}.urdf", file_part(context.robot_name)), urdf(robot, context)?),
+        (format!("kinematics{mark}.yaml"), kinematics_yaml(robot, context.robot, note)),
+        (format!("kinematics{mark}.xacro"), kinematics_xacro(robot, note)),
+        (format!("mdh{mark}.csv"), mdh_csv(robot, note)),
     ])
 }
 

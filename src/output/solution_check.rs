@@ -74,6 +74,9 @@ fn robot(r: &SolutionRecord) -> Result<()> {
     let robot = &r.robot;
     require(!robot.readings.is_empty(), "robot.readings", "is empty")?;
     length("robot.reading_kinds", robot.reading_kinds.len(), robot.readings.len())?;
+    if !r.offsets_to_enter.is_empty() {
+        length("offsets_to_enter", r.offsets_to_enter.len(), robot.readings.len())?;
+    }
     for (k, joint) in robot.joints.iter().enumerate() {
         let field = |name: &str| format!("robot.joints[{k}].{name}");
         pose(&field("nominal_origin"), &joint.nominal_origin)?;

@@ -401,6 +401,10 @@ pub struct SolutionRecord {
     /// True where the corrected URDF belongs to a controller into which mastering.csv was entered: joint offsets are not in it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub offsets_in_mastering: bool,
+    /// What that controller then adds to its readings, rad or m in the order of the joints: none for an offset that the URDF holds. Absent
+    /// in files of earlier versions, whose URDF holds no offset.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub offsets_to_enter: Vec<f64>,
     /// Starting values.
     pub starts: Vec<StartVerdict>,
     /// Robot.

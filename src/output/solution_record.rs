@@ -4,6 +4,7 @@ use super::bodies_record::BodiesRecord;
 use super::estimates::lower_triangle;
 use super::gauge::Gauge;
 use super::image_records::{ImageRecords, flat};
+use super::mastering::to_enter;
 use super::pose_files::determined;
 use super::solution_json::{
     AccuracyRecord, FORMAT, JointRecord, PlacedRecord, ProgramRecord, RobotRecord, ScatterRecord, SolutionRecord,
@@ -55,6 +56,10 @@ pub(super) fn record(
         notices: solution.notices(),
         findings: solution.findings.iter().map(Into::into).collect(),
         offsets_in_mastering: context.offsets == Offsets::Mastering,
+        offsets_to_enter: match context.offsets {
+            Offsets::Folded => Vec::new(),
+            Offsets::Mastering => to_enter(solution, context),
+        },
         starts: solution.starts.clone(),
         robot: robot(&solution.fit.state, solution.fit.problem.twist_factor()),
         cameras: seen.cameras(),

@@ -8,9 +8,11 @@ use nalgebra::{Matrix4, Vector3, Vector6};
 use robotcal::Code;
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{Options, RobotModel, Selection, identify};
+use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
+use robotcal::output::difference::compare_solutions;
 use robotcal::output::flange_table::flange_at;
-use robotcal::output::restore::found_model;
+use robotcal::output::restore::{exported_robot, found_model};
 use robotcal::output::{
     Offsets, compensated, files, kinematics_xacro, kinematics_yaml, read_compensation, solution_json,
 };
@@ -47,6 +49,16 @@ fn rows(text: &str) -> Vec<BTreeMap<String, String>> {
         .collect()
 }
 
+/// What mastering.csv tells to enter, rad: rows that the URDF does not hold.
+fn to_enter(files: &Files) -> Vec<f64> {
+    let table = rows(&text(files, "mastering.csv"));
+    let entered = |row: &BTreeMap<String, String>| match row["in_urdf"].as_str() {
+        "no" => row["offset"].parse::<f64>().unwrap().to_radians(),
+        _ => 0.0,
+    };
+    table.iter().map(entered).collect()
+}
+
 /// The one that goes without compensation.toml: no term, the origins of the robot that does best by itself, in either place of the offsets.
 #[test]
 fn the_urdf_for_those_who_read_nothing_else_is_a_file_of_its_own() {
@@ -60,8 +72,10 @@ fn the_urdf_for_those_who_read_nothing_else_is_a_file_of_its_own() {
     let alone = solution.uncertainty.alone.as_ref().unwrap();
     let mut mastering = context(&description);
     mastering.offsets = Offsets::Mastering;
-    for (of, context) in [(alone.clone(), context(&description)), (alone.mastered().0, mastering)] {
-        let urdf = text(&files(&solution, &context).unwrap(), name);
+    for context in [context(&description), mastering] {
+        let files = files(&solution, &context).unwrap();
+        let of = alone.mastered_by(&to_enter(&files));
+        let urdf = text(&files, name);
         let chain = RobotDescription::from_text(Path::new("c.urdf"), urdf).unwrap().chain(None, None).unwrap();
         let (written, q) = (Robot::nominal(chain), [0.4, -1.2, 1.1, 0.7, -0.9, 2.0]);
         let (angle, distance) = written.base_from_tip(&q).distance(&of.base_from_tip(&q));
@@ -110,7 +124,7 @@ fn offsets_in_the_controller_or_in_the_origins_are_the_same_robot() {
     assert!(named(&mastering) > named(&folded), "the report tells to enter the zeros");
     let table = rows(&text(&mastering, "mastering.csv"));
     assert_eq!(table.len(), 6);
-    assert!(table.iter().all(|r| r["in_urdf"] == "no" && r["unit"] == "deg"));
+    assert!(table.iter().all(|r| (r["in_urdf"] == "no") == (r["determined"] == "yes") && r["unit"] == "deg"));
     assert!(rows(&text(&folded, "mastering.csv")).iter().all(|r| r["in_urdf"] == "yes"));
     let determined: Vec<&str> = table.iter().map(|r| r["determined"].as_str()).collect();
     assert_eq!((determined[0], determined[5]), ("no", "no"), "first and last joint belong to base and tool");
@@ -119,7 +133,7 @@ fn offsets_in_the_controller_or_in_the_origins_are_the_same_robot() {
         let (offset, sigma) = (degrees(r, "offset"), degrees(r, "sigma"));
         assert!(offset.abs() > 2.0 * sigma || sigma < 0.029, "{offset} +- {sigma} deg is no offset to enter");
     }
-    let offsets: Vec<f64> = table.iter().map(|r| r["offset"].parse::<f64>().unwrap().to_radians()).collect();
+    let offsets = to_enter(&mastering);
     assert!(offsets.iter().any(|o| o.abs() > 1e-4), "no offset, no test");
     let (one, other) = (reread(&folded), reread(&mastering));
     assert_ne!(one.chain, other.chain);
@@ -127,10 +141,82 @@ fn offsets_in_the_controller_or_in_the_origins_are_the_same_robot() {
         let q: Vec<f64> = (0..6).map(|i| ((5 * k + 2 * i) as f64).sin()).collect();
         let shown: Vec<f64> = q.iter().zip(&offsets).map(|(q, o)| q + o).collect();
         let (rad, m) = one.base_from_tip(&q).distance(&other.base_from_tip(&shown));
-        // Six decimals of a degree, six joints, at most 1.5 m.
-        assert!(rad < 6e-8 && m < 8e-8, "{m:e} m, {rad:e} rad");
+        // What the six decimals of the table leave stands in the URDF.
+        assert!(rad < 1e-9 && m < 1e-9, "{m:e} m, {rad:e} rad");
     }
 }
+
+/// Who enters what the file tells to enter, and nothing else, has the robot that was found; so has every command that reads the solution.
+#[test]
+fn a_controller_that_took_the_determined_offsets_has_the_robot_that_was_found() {
+    let description = robot();
+    let mut solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    // Offsets of every size, of joints that are determined and of those that are not.
+    let readings = description.chain(None, None).unwrap().readings.len();
+    for t in solution.fit.state.robot.terms.iter_mut().filter(|t| t.term == Term::Offset) {
+        t.value += 1e-3 * (t.reading as f64 + 1.0);
+    }
+    let mut mastering = context(&description);
+    mastering.offsets = Offsets::Mastering;
+    let files = files(&solution, &mastering).unwrap();
+    let entered = to_enter(&files);
+    let count = entered.iter().filter(|offset| **offset != 0.0).count();
+    assert!(count > 0 && count < readings, "both kinds of offsets: {entered:?}");
+    let record = solution_json::read(&files[solution_json::FILE_NAME]).unwrap();
+    let exported = exported_robot(&record).unwrap();
+    let (full, written) = (&solution.fit.state.robot, reread(&files));
+    for k in 0..20 {
+        let q: Vec<f64> = (0..6).map(|i| ((5 * k + 2 * i) as f64).sin()).collect();
+        let shown: Vec<f64> = q.iter().zip(&entered).map(|(q, o)| q + o).collect();
+        for (of, robot) in [("files", &written), ("exported robot of the solution", &exported)] {
+            assert_same(of, robot.base_from_tip(&shown), full.base_from_tip(&q));
+        }
+    }
+    let folded =
+        solution_json::read(&self::files(&solution, &context(&description)).unwrap()[solution_json::FILE_NAME])
+            .unwrap();
+    let apart = compare_solutions(&folded, &record).unwrap();
+    assert!(apart.everywhere.rms_m < 1e-9, "one robot");
+    assert_eq!(apart.zeros, record.offsets_to_enter, "which takes other joint angles");
+}
+
+/// The URDF with frames is the exported one, and `compensate` knows the solution from which the exported one came.
+#[test]
+fn commands_take_the_exported_robot_of_a_mastered_solution() {
+    let description = robot();
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let mut mastering = context(&description);
+    mastering.offsets = Offsets::Mastering;
+    let files = files(&solution, &mastering).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    for name in [solution_json::FILE_NAME, "kuka_kr6_r900.calibrated.urdf"] {
+        std::fs::write(path(name), &files[name]).unwrap();
+    }
+    std::fs::write(path("nominal.urdf"), &description.text).unwrap();
+    let run = |args: &[&str]| {
+        std::process::Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).current_dir(&folder).output().unwrap()
+    };
+    let output = run(&["frames", "--from", solution_json::FILE_NAME, "--plate", "--out", "frames"]);
+    let listed = std::fs::read_dir(path("frames")).unwrap().map(|e| e.unwrap().path());
+    let urdf = listed.into_iter().find(|p| p.to_string_lossy().ends_with(".frames.urdf"));
+    let urdf = urdf.unwrap_or_else(|| panic!("{}", String::from_utf8_lossy(&output.stderr)));
+    let record = solution_json::read(&files[solution_json::FILE_NAME]).unwrap();
+    let (base, tip) = (Some(record.robot.base.as_str()), Some(record.robot.tip.as_str()));
+    let framed = robotcal::urdf::read(&urdf).unwrap().chain(base, tip).unwrap();
+    let q = [0.4, -1.2, 1.1, 0.7, -0.9, 2.0];
+    assert_same("frames", Robot::nominal(framed).base_from_tip(&q), reread(&files).base_from_tip(&q));
+
+    std::fs::write(path("program.src"), PROGRAM).unwrap();
+    let corrected = "kuka_kr6_r900.calibrated.urdf";
+    let models = ["--nominal", "nominal.urdf", "--urdf", corrected, "--solution", solution_json::FILE_NAME];
+    let output = run(&[&["compensate", "program.src", "--frames", "nominal", "--out", "fixed"][..], &models].concat());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!said.contains(Code::SolutionDiffers.name()), "{said}");
+    assert!(Path::new(&path("fixed")).is_dir(), "{said}");
+}
+
+const PROGRAM: &str = "DEF P()\nPTP {A1 5, A2 -80, A3 100, A4 10, A5 40, A6 0}\nEND\n";
 
 #[test]
 fn xacro_properties_are_the_origins_of_the_urdf() {

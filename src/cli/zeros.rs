@@ -1,0 +1,81 @@
+//! Which controller readings are of: that of the identification, or the one whose zero points were corrected by its result.
+
+use clap::{Args, ValueEnum};
+
+use super::verify_stated::was_fitted_to;
+use crate::error::Result;
+use crate::output::restore::entered_offsets;
+use crate::output::solution_json::SolutionRecord;
+use crate::series::InputFile;
+
+/// Flag of commands that read joint values to a robot that was identified.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct ReadingsArgs {
+    /// With a result of `identify --offsets mastering`: whether the controller showed these joint values before the offsets of mastering.csv
+    /// were entered, or after [default: before for measurements that the robot was identified from, after for others]
+    #[arg(long, value_enum, value_name = "WHEN")]
+    readings: Option<Readings>,
+}
+
+/// When readings were taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Readings {
+    /// Before the offsets were entered
+    Before,
+    /// After
+    After,
+}
+
+/// How readings are taken.
+pub(super) struct Zeros {
+    /// When they were read.
+    pub readings: Readings,
+    /// What the controller has added to its readings since it showed these, rad or m.
+    pub missing: Vec<f64>,
+    /// What it adds once the offsets are entered.
+    entered: Vec<f64>,
+    is_told: bool,
+}
+
+impl ReadingsArgs {
+    /// How readings to a solution are taken that came with some files; nothing where the exported robot takes the readings of the identification.
+    ///
+    /// # Errors
+    /// A solution that does not hang together.
+    pub(super) fn of(self, record: &SolutionRecord, files: &[InputFile]) -> Result<Option<Zeros>> {
+        let entered = entered_offsets(record)?;
+        if entered.iter().all(|offset| *offset == 0.0) {
+            return Ok(None);
+        }
+        let by_files = if was_fitted_to(record, files) { Readings::Before } else { Readings::After };
+        Ok(Some(Zeros::new(self.readings.unwrap_or(by_files), entered, self.readings.is_some())))
+    }
+}
+
+impl Zeros {
+    fn new(readings: Readings, entered: Vec<f64>, is_told: bool) -> Self {
+        let missing = if readings == Readings::Before { entered.clone() } else { vec![0.0; entered.len()] };
+        Self { readings, missing, entered, is_told }
+    }
+
+    /// The readings taken the other way: what is to be added to those that were taken this way.
+    pub(super) fn instead(&self) -> Vec<f64> {
+        let sign = if self.readings == Readings::Before { -1.0 } else { 1.0 };
+        self.entered.iter().map(|offset| sign * offset).collect()
+    }
+
+    /// The other word for the option.
+    pub(super) fn other(&self) -> &'static str {
+        if self.readings == Readings::Before { "after" } else { "before" }
+    }
+
+    /// What is taken, for the user.
+    pub(super) fn line(&self) -> String {
+        let when = match self.readings {
+            Readings::Before => "before the offsets of mastering.csv were entered (they are added)",
+            Readings::After => "with the offsets of mastering.csv entered",
+        };
+        let why = if self.is_told { String::new() } else { format!("; else say --readings {}", self.other()) };
+        format!("readings  taken as those of the controller {when}{why}")
+    }
+}
