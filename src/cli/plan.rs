@@ -14,7 +14,7 @@ use super::plan_targets::targets;
 use super::plan_touches::{self, TouchArgs};
 use super::pose_argument::pose_or_file;
 use super::robot::{noted_chain, read_chain, refuse_degrees};
-use super::say::say;
+use super::say::{say, say_line};
 use super::show::read_solution;
 use super::simulate::Mount;
 use crate::error::{Code, Error, Result};
@@ -22,6 +22,7 @@ use crate::geom::{OrientedBox, Pose};
 use crate::identify::RobotModel;
 use crate::model::camera::Camera;
 use crate::output::camera_formats::read_camera_file;
+use crate::output::restore::entered_offsets;
 use crate::output::{ResultFolder, plan_files, plan_html, plan_programs, plan_start, sigma_text};
 use crate::plan::candidates::CandidateOptions;
 use crate::plan::refine::USUAL_ROUNDS;
@@ -394,6 +395,11 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)>
     let model: RobotModel = args.robot_model.into();
     if let Some(path) = &args.from {
         let record = read_solution(path)?;
+        if entered_offsets(&record)?.iter().any(|offset| *offset != 0.0) {
+            say_line!(
+                "readings  the joint values are those of the controller before the offsets of mastering.csv were entered, as those of the images before"
+            );
+        }
         let (mut setting, taken) = plan_start::from_solution(&record, chain, model)?;
         for (k, text) in args.plate_pose.iter().enumerate() {
             setting.placements.push((format!("new_{k}"), pose_or_file("--plate-pose", text)?));

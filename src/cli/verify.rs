@@ -78,7 +78,7 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     let stated = Stated::beside(&args.urdf, &model.robot);
     let limits = &Stated::limits_of(stated.as_ref());
     let device_m = point_sigma(args.point_sigma_m, limits)?;
-    let zeros = stated.as_ref().map(|s| args.readings.of(s.record(), &[])).transpose()?.flatten();
+    let zeros = args.readings.beside(stated.as_ref(), &args.urdf, &[])?;
     let model = match &zeros {
         Some(zeros) => model.with_added(&zeros.missing, file)?,
         None => model,

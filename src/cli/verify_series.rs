@@ -81,8 +81,9 @@ fn with_zeros(
     files: &[InputFile],
     mut series: Vec<MeasuredSeries>,
 ) -> Result<Vec<MeasuredSeries>> {
-    let zeros = model.stated.as_ref().map(|s| args.readings.of(s.record(), files)).transpose()?.flatten();
-    let Some(zeros) = zeros else { return Ok(series) };
+    let Some(zeros) = args.readings.beside(model.stated.as_ref(), &args.urdf, files)? else {
+        return Ok(series);
+    };
     say_line!("{}", zeros.line());
     let stops = series.iter_mut().flat_map(|s| &mut s.stops);
     stops.filter_map(|stop| stop.readings.as_mut()).for_each(|readings| add(readings, &zeros.missing));

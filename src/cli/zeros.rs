@@ -1,9 +1,11 @@
 //! Which controller readings are of: that of the identification, or the one whose zero points were corrected by its result.
 
+use std::path::Path;
+
 use clap::{Args, ValueEnum};
 
-use super::verify_stated::was_fitted_to;
-use crate::error::Result;
+use super::verify_stated::{Stated, was_fitted_to};
+use crate::error::{Code, Error, Result};
 use crate::output::restore::entered_offsets;
 use crate::output::solution_json::SolutionRecord;
 use crate::series::InputFile;
@@ -29,7 +31,7 @@ pub(super) enum Readings {
 /// How readings are taken.
 pub(super) struct Zeros {
     /// When they were read.
-    pub readings: Readings,
+    readings: Readings,
     /// What the controller has added to its readings since it showed these, rad or m.
     pub missing: Vec<f64>,
     /// What it adds once the offsets are entered.
@@ -38,6 +40,23 @@ pub(super) struct Zeros {
 }
 
 impl ReadingsArgs {
+    /// As [`ReadingsArgs::of`], for the solution of a description, where there is one.
+    ///
+    /// # Errors
+    /// The flag without such a solution: nothing says then by how much the two differ.
+    pub(super) fn beside(self, stated: Option<&Stated>, urdf: &Path, files: &[InputFile]) -> Result<Option<Zeros>> {
+        match (stated, self.readings) {
+            (Some(stated), _) => self.of(stated.record(), files),
+            (None, None) => Ok(None),
+            (None, Some(_)) => {
+                let what =
+                    format!("needs the solution.json from which {} came, and none stands beside it", urdf.display());
+                let remedy = "give the description in its folder of results, or leave the flag out";
+                Err(Error::new(Code::OptionConflict, "--readings", what, remedy))
+            }
+        }
+    }
+
     /// How readings to a solution are taken that came with some files; nothing where the exported robot takes the readings of the identification.
     ///
     /// # Errors
