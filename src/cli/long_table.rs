@@ -144,6 +144,18 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     )?;
     writeln!(out, "          nominal    {}   base and tool that fit it best", mm(e.nominal_m))?;
     let (alone_m, _) = e.best_urdf_m();
+    if r.has_no_robot() {
+        writeln!(
+            out,
+            "          as given   {}   poses of the controller, with camera and plate as found",
+            mm(alone_m)
+        )?;
+        let scatter_mm = 1e3 * e.scatter_m;
+        return writeln!(
+            out,
+            "          {scatter_mm:.3} mm of it is how these poses are off from stop to stop: errors of the controller's own model of the robot among them, which --urdf takes away"
+        );
+    }
     writeln!(out, "          calibrated {}   corrected URDF alone", mm(alone_m))?;
     if r.beyond_urdf() {
         if e.alone_m.is_some() {

@@ -105,7 +105,7 @@ fn flange(r: &SolutionRecord) -> Vec<String> {
     let mut lines = vec![
         format!("accuracy  expected flange error where the stops were, RMS{told}:"),
         row("nominal robot", e.nominal_m, i.map(|i| i.nominal_m)),
-        row("corrected URDF alone", alone_m, of_alone),
+        row(if r.has_no_robot() { "poses of the controller" } else { "corrected URDF alone" }, alone_m, of_alone),
     ];
     if r.beyond_urdf() {
         lines.push(row("with compensation.toml", e.model_m, i.map(|i| i.model_m)));

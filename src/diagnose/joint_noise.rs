@@ -42,6 +42,8 @@ pub struct JointNoiseLarge {
     pub by_images: bool,
     /// Whether the readings were computed from poses of a controller.
     pub readings_are_computed: bool,
+    /// Whether the readings are poses as a controller gives them, with no robot between: their errors are those of its own robot model.
+    pub readings_are_poses: bool,
     /// Gate or note.
     pub weight: Weight,
 }
@@ -75,6 +77,7 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
             stands_still: stands_still(of, reading, limits.moved_images),
             by_images: problem.used_on_robot().any(|i| problem.images[i].series == k),
             readings_are_computed,
+            readings_are_poses: fit.state.robot.chain.pose_coordinates().is_some(),
             weight,
         })
     };
@@ -136,6 +139,16 @@ impl Kind for JointNoiseLarge {
 
     fn seen(&self) -> String {
         let unit = self.kind.units()[1];
+        if self.readings_are_poses {
+            return format!(
+                "the poses of the controller are off by {:.2} {unit} ({} most) against the images from stop to stop: it computes them by its own \
+                 model of the robot, and arms are off by about a millimetre by theirs (absolute accuracy){}{}",
+                1e3 * self.sigma,
+                self.joint,
+                in_words(", the others predict worst", &self.worst_predicted, |mm| format!("{mm:.1} mm")),
+                in_words(", blurred or badly seen", &self.badly_seen, |px| format!("sigma {px:.3} px"))
+            );
+        }
         let still = self.stands_still.as_ref().map_or_else(String::new, |still| format!(", which reads {still}"));
         format!(
             "the joint noise is {:.2} {unit} ({} most{still}), where {} repeat to some 0.1 {unit}{}{}",
@@ -149,6 +162,10 @@ impl Kind for JointNoiseLarge {
 
     fn remedy(&self) -> String {
         let remedy = match self.weight {
+            _ if self.readings_are_poses => {
+                "give the description of the robot with --urdf (and joint readings, joints.csv, where there are any): its errors are then found; the \
+                 stated sigmas contain them. If the arm is in order, and they are far more than a millimetre: did plate or camera move?"
+            }
             _ if self.readings_are_computed => {
                 "the joint readings were computed from poses, which tell neither postures nor full turns for certain, and take the URDF for the \
                  model in the controller: record joint readings (joints.csv)"

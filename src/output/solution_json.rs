@@ -457,6 +457,11 @@ impl SolutionRecord {
         self.options.as_ref().map(|o| o.limits).unwrap_or_default()
     }
 
+    /// True where the readings are poses of a controller, and no robot was given: there is nothing to correct.
+    pub fn has_no_robot(&self) -> bool {
+        self.file_ending_with(super::robot_files::CALIBRATED).is_none()
+    }
+
     /// True where the data say less of a parameter than counts.
     pub fn hardly_determines(&self, estimate: &EstimateRecord) -> bool {
         estimate.share_of_data.is_some_and(|share| share < self.limits().share_of_data)

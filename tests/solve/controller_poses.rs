@@ -128,6 +128,23 @@ fn hand_eye_transform_and_noise_are_found_without_a_robot() {
     }
 }
 
+/// Poses by a model that is off by a millimetre and more: there is no rail, and their errors are those of that model.
+#[test]
+fn errors_of_the_model_in_the_controller_are_no_noise_of_a_rail() {
+    let mut all = poses(&truth(), 5);
+    let mut dice = Dice::new(9);
+    all.iter_mut().for_each(|(_, pose)| {
+        *pose = pose.perturbed(&Vector6::from_fn(|k, _| dice.normal(if k < 3 { 1.6e-3 } else { 1e-3 })))
+    });
+    let folder = series("rotvec_rad", "rx,ry,rz", &all, rotation_vector);
+    let calibration = calibrated(&folder).unwrap();
+    let found = calibration.solution().findings.iter().find_map(|f| match f {
+        Finding::JointNoiseLarge(noise) => Some(noise),
+        _ => None,
+    });
+    assert!(found.unwrap().readings_are_poses, "{found:?}");
+}
+
 /// The poses are what they are: that nothing is gained over them is no fault.
 #[test]
 fn poses_without_a_robot_need_no_gain() {

@@ -70,7 +70,7 @@ fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
     let (alone_m, of_alone) = e.best_urdf_m();
     let mut rows = vec![
         ("Nominal robot", e.nominal_m, i.map(|i| i.nominal_m), "before"),
-        ("Corrected URDF alone", alone_m, of_alone, "after"),
+        (if r.has_no_robot() { "Poses of the controller" } else { "Corrected URDF alone" }, alone_m, of_alone, "after"),
     ];
     if r.beyond_urdf() {
         rows.push(("Corrected URDF with compensation.toml", e.model_m, i.map(|i| i.model_m), "after"));
@@ -90,7 +90,13 @@ fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
         } }
         p.note {
             "Position of the flange relative to " (r.flange_is_relative_to()) " in the region of the stops, by model and covariance; the nominal robot with the base and "
-            "the tool that fit it best. " (significant(1e3 * e.scatter_m)) " mm of each is noise from stop to stop, which no model takes away. "
+            "the tool that fit it best. " (significant(1e3 * e.scatter_m))
+            @if r.has_no_robot() {
+                " mm of it is how the poses of the controller are off from stop to stop: errors of its own model of the robot among them, which a run with "
+                code { "--urdf" } " takes away. "
+            } @else {
+                " mm of each is noise from stop to stop, which no model takes away. "
+            }
             "This is the figure to quote; " a href="#workspace" { "elsewhere in the workspace" } " it is larger."
         }
     }
@@ -124,7 +130,7 @@ fn steps(r: &SolutionRecord, v: &Verdict) -> Vec<Markup> {
         all.push(html! {
             "Use " code { (urdf) } @if alone.is_some() { " where nothing else than a URDF is read" }
             @if r.offsets_in_mastering {
-                ", and enter " code { "mastering.csv" } " in the controller first: joint offsets are not in the URDF."
+                ", and enter the offsets of " code { "mastering.csv" } " with in_urdf = no in the controller first, and no others: these are not in the URDF."
             } @else {
                 ": joint offsets are in it, controller angles stay as they are."
             }
