@@ -146,3 +146,20 @@ fn prism_and_principal_point_are_kept_apart() {
     println!("principal point known to {brown:?} px, with a prism to {prism:?} px");
     assert!(prism.iter().zip(&brown).all(|(p, b)| *p < 5.0 * b + 0.5), "{prism:?} {brown:?}");
 }
+
+/// A wide lens with a prism, for which numerator and denominator nearly say the same: the fit stays in the image, and comes as near as one
+/// without denominator.
+#[test]
+fn the_nearest_lens_of_a_wide_prism_is_found() {
+    for parameters in [
+        [834.06, 834.4, 647.18, 507.404, -0.11, 0.09, 4e-4, -3e-4, -0.02, 3e-3, -2e-3, -2.5e-3, 1.5e-3],
+        [833.9, 834.2, 640.3, 513.8, -0.1102, 0.0911, 1.5e-3, -1.1e-3, -0.0207, 5e-4, 1.2e-3, -4e-4, -9e-4],
+        [480.0, 480.0, 639.5, 511.5, -0.2, 0.06, 4e-4, -3e-4, -0.006, 3e-3, -2e-3, -2.5e-3, 1.5e-3],
+    ] {
+        let camera = Camera { lens: Lens::ThinPrism, width_px: 1280, height_px: 1024, parameters: parameters.to_vec() };
+        let depths = [0.3, 0.6];
+        let found = camera.in_ros(&depths).unwrap();
+        let brown = fit_lens(&camera, Lens::Brown, &depths).unwrap();
+        assert!(found.rms_px <= 1.01 * brown.rms_px, "{} against {}", found.rms_px, brown.rms_px);
+    }
+}

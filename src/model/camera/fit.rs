@@ -57,15 +57,37 @@ pub fn fit_lens_to(
     if points.len() < ACROSS * ACROSS / 2 {
         return None;
     }
-    let mut fitted = Camera::pinhole(lens, camera.width_px, camera.height_px, camera.parameters[0]);
-    fitted.parameters[..4].copy_from_slice(&camera.parameters[..4]);
+    let mut start = Camera::pinhole(lens, camera.width_px, camera.height_px, camera.parameters[0]);
+    start.parameters[..4].copy_from_slice(&camera.parameters[..4]);
+    let free = settled(&start, points, zeros, squares);
+    free.or_else(|| settled(&within_image(&start, points, zeros), points, zeros, squares_of_images))
+}
+
+/// Where a fit starts that is held to cameras which image all points: with a denominator from the lens without one, as numerator and
+/// denominator nearly say the same, and a fit from far away leaves a pole between the points.
+fn within_image(start: &Camera, points: &[(Vector3<f64>, Vector2<f64>)], zeros: &[usize]) -> Camera {
+    let mut plain = Camera::pinhole(Lens::Brown, start.width_px, start.height_px, start.parameters[0]);
+    plain.parameters[..4].copy_from_slice(&start.parameters[..4]);
+    let count = plain.parameters.len();
+    let zeros: Vec<usize> = zeros.iter().copied().filter(|k| *k < count).collect();
+    let extended = || settled(&plain, points, &zeros, squares_of_images)?.camera.extended(start.lens);
+    extended().unwrap_or_else(|| start.clone())
+}
+
+/// A sum of squares over points (m) with their images (px).
+type Cost = fn(&Camera, &[(Vector3<f64>, Vector2<f64>)]) -> Option<f64>;
+
+/// Gauss-Newton from a camera; `cost_of` is the sum of squares that has to fall, and says where a camera may not go. `None` where the camera to
+/// which it comes does not image all points.
+fn settled(start: &Camera, points: &[(Vector3<f64>, Vector2<f64>)], zeros: &[usize], cost_of: Cost) -> Option<LensFit> {
+    let mut fitted = start.clone();
     let mut damping = 1e-6;
-    let mut cost = squares(&fitted, points)?;
+    let mut cost = cost_of(&fitted, points)?;
     for _ in 0..STEPS {
         let mut next = fitted.clone();
         let step = step(&fitted, points, damping, zeros);
         next.parameters.iter_mut().zip(step.iter().flatten()).for_each(|(p, s)| *p += s);
-        match squares(&next, points).filter(|c| step.is_some() && *c <= cost) {
+        match cost_of(&next, points).filter(|c| step.is_some() && *c <= cost) {
             Some(lower) => {
                 let settled = cost - lower < 1e-12 * (cost + 1e-12);
                 (fitted, cost, damping) = (next, lower, (0.1 * damping).max(1e-9));
@@ -99,6 +121,12 @@ fn points(camera: &Camera, depths_m: &[f64; 2]) -> Vec<(Vector3<f64>, Vector2<f6
 fn squares(camera: &Camera, points: &[(Vector3<f64>, Vector2<f64>)]) -> Option<f64> {
     let square =
         |(x, uv): &(Vector3<f64>, Vector2<f64>)| Some((camera.project_with_jacobian(x)?.uv - uv).norm_squared());
+    points.iter().map(square).sum::<Option<f64>>().filter(|s| s.is_finite())
+}
+
+/// As [`squares`], and `None` for a camera that does not image all points.
+fn squares_of_images(camera: &Camera, points: &[(Vector3<f64>, Vector2<f64>)]) -> Option<f64> {
+    let square = |(x, uv): &(Vector3<f64>, Vector2<f64>)| Some((camera.project(x)? - uv).norm_squared());
     points.iter().map(square).sum::<Option<f64>>().filter(|s| s.is_finite())
 }
 
