@@ -4,6 +4,7 @@ use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::{Accuracy, Bearer, Limits, Pattern, PatternEffect, PatternTest, cause, patterns};
 use crate::error::Code;
 use crate::fit::Fit;
+use crate::model::camera::Lens;
 
 /// The residuals show a pattern.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +19,8 @@ pub struct ResidualPattern {
     pub is_fitted: bool,
     /// True where the lens has a displacement field already.
     pub has_field: bool,
+    /// Lenses that were tried for the camera and have less evidence than the one that was taken.
+    pub tried: Vec<Lens>,
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<ResidualPattern> {
@@ -35,7 +38,7 @@ pub fn residual_pattern(fit: &Fit, limits: &Limits) -> Option<ResidualPattern> {
     let matters = found.moved.is_some_and(|m| m.sigmas() > limits.pattern_moves);
     let is_fitted = matches!(found.bearer, Bearer::Camera(k) if found.pattern.is_fitted(fit, k));
     let has_field = matches!(found.bearer, Bearer::Camera(k) if fit.state.cameras[k].lens.has_field());
-    Some(ResidualPattern { found, bearer, matters, is_fitted, has_field })
+    Some(ResidualPattern { found, bearer, matters, is_fitted, has_field, tried: Vec::new() })
 }
 
 /// What it looks like, and what removes it.
@@ -63,6 +66,15 @@ fn words(pattern: Pattern) -> [&'static str; 2] {
 }
 
 impl ResidualPattern {
+    /// The lens that the remedy would name.
+    fn remedy_lens(&self) -> Option<Lens> {
+        match self.found.bearer {
+            Bearer::Plate(_) => None,
+            Bearer::Camera(_) if self.is_fitted || self.found.pattern == Pattern::Field => Some(Lens::BrownField),
+            Bearer::Camera(_) => self.found.pattern.lens(),
+        }
+    }
+
     fn moves(&self) -> String {
         let Some(PatternEffect { flange_m, pose_m, pose_rad }) = self.found.moved else { return String::new() };
         match flange_m {
@@ -142,6 +154,9 @@ impl Kind for ResidualPattern {
         match self.is_fitted {
             _ if self.has_field => {
                 "no lens of this program has it beside a displacement field: nothing to do while the flange moves by less than its sigma".into()
+            }
+            _ if self.remedy_lens().is_some_and(|lens| self.tried.contains(&lens)) => {
+                "the lenses that could have it were tried and have less evidence than this one: nothing to do while the flange moves by less than its sigma; else see whether focus or mount of the lens changed during the series".into()
             }
             true => "this lens has terms of this kind, and they do not suffice: try --camera brown+field".into(),
             false => words(self.found.pattern)[1].into(),

@@ -10,15 +10,13 @@ pub struct LensNotInRos {
     pub camera: String,
     /// Its lens.
     pub lens: &'static str,
-    /// What is lost, RMS over the image, px.
-    pub rms_px: f64,
-    /// The most, px.
-    pub worst_px: f64,
+    /// What is lost over the image, RMS and at most, px; none where no lens of ROS comes near, and there is no camera.yaml.
+    pub loss_px: Option<[f64; 2]>,
 }
 
 impl Kind for LensNotInRos {
     fn code(&self) -> Code {
-        Code::LensNotInRos
+        if self.loss_px.is_some() { Code::LensNotInRos } else { Code::CameraFileImpossible }
     }
 
     fn weight(&self) -> Weight {
@@ -30,7 +28,9 @@ impl Kind for LensNotInRos {
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        vec![Quantity::new("rms", self.rms_px, "px"), Quantity::new("worst", self.worst_px, "px")]
+        let named =
+            self.loss_px.map(|[rms, worst]| [Quantity::new("rms", rms, "px"), Quantity::new("worst", worst, "px")]);
+        named.into_iter().flatten().collect()
     }
 
     fn place(&self) -> String {
@@ -38,13 +38,19 @@ impl Kind for LensNotInRos {
     }
 
     fn seen(&self) -> String {
-        format!(
-            "camera.yaml cannot express its {} lens: it is off by {:.3} px RMS over the image, at most {:.3} px",
-            self.lens, self.rms_px, self.worst_px
-        )
+        match self.loss_px {
+            Some([rms, worst]) => format!(
+                "camera.yaml cannot express its {} lens: it is off by {rms:.3} px RMS over the image, at most {worst:.3} px",
+                self.lens
+            ),
+            None => format!("no lens of ROS comes near to its {} lens: there is no camera.yaml", self.lens),
+        }
     }
 
     fn remedy(&self) -> String {
-        "solution.json has the lens itself; --camera ros identifies one that camera.yaml can express".into()
+        match self.loss_px {
+            Some(_) => "solution.json has the lens itself; --camera ros identifies one that camera.yaml can express".into(),
+            None => "solution.json has the lens itself, and robotcal convert writes it in a format that holds it; --camera ros identifies one that camera.yaml can express".into(),
+        }
     }
 }

@@ -132,7 +132,8 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         marker: Vec::new(),
         body: vec![[1.0; 2]; bodies.components],
     };
-    let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
+    let of_camera = |k: usize| [Family::of_field(&layout, &state, k), Family::of_lens(&layout, &state, k)];
+    let families = (0..cameras.len()).flat_map(of_camera).flatten().collect();
     let mut problem = Problem {
         layout,
         plates,

@@ -16,7 +16,7 @@ use super::options::{JointNoise, Options};
 use super::solution::{Evidence, LensEvidence, Solution};
 use super::turns;
 use crate::assess::Limits;
-use crate::diagnose::{ToolInPoses, follows_from_tool};
+use crate::diagnose::{Finding, ToolInPoses, follows_from_tool};
 use crate::error::{Notice, Result};
 use crate::fit::{Fit, NoEvidence, log_evidence_of_fit, log_evidence_of_outcome};
 use crate::linalg::SymmetricFactor;
@@ -87,9 +87,20 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
         solution.findings.retain(|other| !follows_from_tool(other, &mountings));
         solution.findings.push(tool.into());
     }
-    let losses = lens_choice::losses(&solution);
+    name_tried_lenses(&mut solution);
+    let losses = lens_choice::losses(&solution.fit.adjustment, &solution.free_poses);
     solution.findings.extend(losses.into_iter().map(Into::into));
     Ok(Solution { options: options.clone(), ..solution })
+}
+
+/// No finding tells to try a lens that was tried, and has less evidence.
+fn name_tried_lenses(solution: &mut Solution) {
+    for finding in &mut solution.findings {
+        let Finding::ResidualPattern(pattern) = finding else { continue };
+        let of_camera = || solution.lenses.iter().filter(|lens| lens.camera == pattern.bearer);
+        let taken = of_camera().find(|lens| lens.taken).map_or(f64::NEG_INFINITY, |lens| lens.log_evidence);
+        pattern.tried = of_camera().filter(|l| !l.taken && l.log_evidence < taken).map(|lens| lens.lens).collect();
+    }
 }
 
 fn of_tool(robot: &Robot, series: &[MeasuredSeries], options: &Options) -> Option<ToolInPoses> {

@@ -6,7 +6,7 @@ use super::build::build;
 use super::free_poses::free_poses_of;
 use super::joint::{JointFit, fit_model};
 use super::options::Options;
-use super::solution::{LensEvidence, Solution};
+use super::solution::LensEvidence;
 use crate::assess::{Limits, camera_shows_pattern};
 use crate::diagnose::LensNotInRos;
 use crate::error::{Code, Error, Notice, Result};
@@ -29,7 +29,7 @@ const SOME_STOPS: usize = 250;
 const DECREMENT: f64 = 0.01;
 /// Rounds in which image noise and fit follow the lens.
 const ROUNDS: usize = 3;
-/// The same for a lens with a displacement field.
+/// The same for a lens with a displacement field, or with coefficients that usual lenses have small.
 const FIELD_ROUNDS: usize = 8;
 
 /// The fit of one robot model with the lenses that its evidence supports.
@@ -83,17 +83,20 @@ pub(super) fn with_lenses(chain: &Chain, series: &[MeasuredSeries], options: &Op
 impl Lensed {
     /// The first lenses, where the fit with those of the evidence came to no end.
     fn kept(mut self, error: &Error) -> Self {
+        let evidences = self.lenses.clone();
         for lens in self.lenses.iter_mut().filter(|l| l.taken) {
             let first = self.series.iter().find(|s| s.camera == lens.camera).map(|s| s.lens);
             let Some(first) = first.filter(|first| *first != lens.lens) else { continue };
             lens.taken = false;
+            let of_first = evidences.iter().find(|l| l.camera == lens.camera && l.lens == first);
+            let more = of_first.map_or(f64::NAN, |l| lens.log_evidence - l.log_evidence);
             let what = format!(
-                "lens '{}' has more evidence, and the fit with it came to no end ({}): '{}' is kept",
+                "lens '{}' has {more:.0} more in log evidence, and the fit with it came to no end ({}): '{}' is kept, and what it does not describe is left out or spoils the rest",
                 lens.lens.name(),
                 error.what,
                 first.name()
             );
-            let remedy = format!("name a lens with --camera, or look at the residuals of camera {}", lens.camera);
+            let remedy = format!("name another lens with --camera, or look at the residuals of camera {}", lens.camera);
             self.notices.push(Notice::new(Code::NotConverged, format!("camera {}", lens.camera), what, remedy));
         }
         let kept = |l: &LensEvidence| self.series.iter().any(|s| s.camera == l.camera && s.lens == l.lens);
@@ -209,7 +212,7 @@ impl BetterLens {
         let mut other = fit.with_camera(self.index, self.camera);
         let problem = &mut other.problem;
         problem.noise.pixel_factor[self.index] = self.pixel_factor;
-        problem.families.iter_mut().filter(|f| f.held.ncols() > 0).for_each(|f| f.take_factor(&self.families));
+        problem.families.iter_mut().filter(|f| f.is_of_lens()).for_each(|f| f.take_factor(&self.families));
         other
     }
 }
@@ -219,8 +222,8 @@ fn evidence(
     (camera, depths_m): (usize, &[f64; 2]),
     lens: Lens,
 ) -> Option<(LensEvidence, Option<BetterLens>)> {
-    // The size of a displacement field is found from above.
-    let rounds = if lens.has_field() { FIELD_ROUNDS } else { ROUNDS };
+    // The size of a displacement field is found from above, that of unusual coefficients by doubling.
+    let rounds = if lens.has_field() || lens.has_usual_priors() { FIELD_ROUNDS } else { ROUNDS };
     let outcome = settled(with_lens(fit, (camera, depths_m), lens)?, rounds);
     let log_evidence = log_evidence_of_outcome(&outcome).ok()?;
     let linear = outcome.linear()?;
@@ -229,7 +232,7 @@ fn evidence(
 
 /// The optimum near an adjustment. Image noise follows the lens; joint noise, tilt and the sizes of families stay.
 fn settled(mut near: Adjustment, rounds: usize) -> Outcome {
-    near.problem.families.retain(|f| f.held.ncols() > 0);
+    near.problem.families.retain(Family::is_of_lens);
     let settings = Settings { decrement: DECREMENT, ..Settings::default() };
     let options =
         ComponentOptions { joint: false, displacement: false, rounds, settings, ..ComponentOptions::default() };
@@ -285,18 +288,12 @@ pub fn depths_m(problem: &Problem, free: &FreePoses) -> Vec<[f64; 2]> {
 }
 
 /// What the cameras of ROS cannot say of the lenses that were identified.
-pub(super) fn losses(solution: &Solution) -> Vec<LensNotInRos> {
-    let named = solution
-        .fit
-        .problem
-        .cameras
-        .iter()
-        .zip(&solution.fit.state.cameras)
-        .zip(depths_m(&solution.fit.problem, &solution.free_poses));
+pub(super) fn losses(Adjustment { problem, state }: &Adjustment, free: &FreePoses) -> Vec<LensNotInRos> {
+    let named = problem.cameras.iter().zip(&state.cameras).zip(depths_m(problem, free));
     let loss = |((name, camera), depths): ((&String, &Camera), [f64; 2])| {
-        let fit = camera.in_ros(&depths)?;
-        let (camera, lens) = (name.clone(), camera.lens.name());
-        Some(LensNotInRos { camera, lens, rms_px: fit.rms_px, worst_px: fit.worst_px })
+        let loss_px = camera.in_ros(&depths).map(|fit| [fit.rms_px, fit.worst_px]);
+        let (lens, is_in_ros) = (camera.lens.name(), camera.lens.is_in_ros());
+        (!is_in_ros).then(|| LensNotInRos { camera: name.clone(), lens, loss_px })
     };
     named.filter_map(loss).collect()
 }

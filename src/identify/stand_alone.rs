@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Matrix3x6, Matrix6};
 
 use super::free_poses::{covariance_together, free_poses_of};
-use super::lens_choice::{choose_lens, open_cameras};
+use super::lens_choice::{choose_lens, losses, open_cameras};
 use super::solution::Solution;
 use super::start_verdict::StartVerdict;
 use crate::assess::{Limits, camera_shows_pattern};
@@ -105,6 +105,8 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     findings.extend(observations_left_out(&fit, limits).map(Finding::from));
     findings.extend(residual_pattern(&fit, limits).map(Finding::from));
     findings.extend(tags_off(&fit, limits).into_iter().map(Finding::from));
+    let lost = losses(&fit.adjustment, &free_poses).into_iter().filter(|lens| lens.loss_px.is_none());
+    findings.extend(lost.map(Finding::from));
     Ok(StandAlone { fit, free_poses, series, starts, notices, findings })
 }
 

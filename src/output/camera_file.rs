@@ -8,14 +8,12 @@ use crate::model::camera::{Camera, Lens};
 #[cfg(feature = "mcap")]
 use crate::series::CameraInfo;
 
-/// One file for each camera that sees between two depths (m), as (file name, text).
-///
-/// # Errors
-/// A lens that camera_info cannot express.
-pub(super) fn cameras(names: &[String], cameras: &[Camera], depths_m: &[[f64; 2]]) -> Result<Vec<(String, String)>> {
+/// One file for each camera that sees between two depths (m), as (file name, text); none for a lens that no model of ROS comes near to, which
+/// a finding names.
+pub(super) fn cameras(names: &[String], cameras: &[Camera], depths_m: &[[f64; 2]]) -> Vec<(String, String)> {
     let cameras = names.iter().zip(cameras).zip(depths_m);
-    let texts = cameras.map(|((name, camera), depths)| camera_yaml(name, camera, depths));
-    file_names("camera", "yaml", names).into_iter().zip(texts).map(|(file, text)| Ok((file, text?))).collect()
+    let texts = cameras.map(|((name, camera), depths)| camera_yaml(name, camera, depths).ok());
+    file_names("camera", "yaml", names).into_iter().zip(texts).filter_map(|(file, text)| Some((file, text?))).collect()
 }
 
 /// Name in ROS of the lens of a camera that ROS has.

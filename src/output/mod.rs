@@ -105,7 +105,7 @@ pub fn files(solution: &Solution, context: &Context) -> Result<BTreeMap<String, 
 /// need not be in memory together.
 ///
 /// # Errors
-/// A camera that a ROS camera_info cannot express, a URDF that cannot be patched, estimates that are not finite; errors of `put`.
+/// A URDF that cannot be patched, estimates that are not finite; errors of `put`.
 pub fn each_file(
     solution: &Solution,
     context: &Context,
@@ -125,7 +125,7 @@ pub fn each_file(
         robot_files::all(solution, context)?.into_iter().try_for_each(|(name, text)| add(name, text.into_bytes()))?;
     }
     let images = names::ImageNames::new(problem, &context.series);
-    let texts = (camera_file::cameras(&problem.cameras, &state.cameras, &depths)?.into_iter())
+    let texts = (camera_file::cameras(&problem.cameras, &state.cameras, &depths).into_iter())
         .chain(pose_files::mountings(solution))
         .chain(pose_files::placements(solution, &gauge))
         .chain(plate_files::plates(&solution.fit, &context.series, &gauge)?);

@@ -128,12 +128,12 @@ struct ImageOf<'a> {
 /// Every file of the result: name -> bytes.
 ///
 /// # Errors
-/// A camera that a ROS camera_info cannot express; markers that lie on a line; estimates that are not finite.
+/// Markers that lie on a line; estimates that are not finite.
 pub fn stand_alone_files(found: &StandAlone, context: &StandAloneContext) -> Result<BTreeMap<String, Vec<u8>>> {
     let Adjustment { problem, state } = &found.fit.adjustment;
     let (series, depths) = (&context.series, depths_m(problem, &found.free_poses));
     let (names, gauge) = (ImageNames::new(problem, series), Gauge::of(&found.fit)?);
-    let cameras = camera_file::cameras(&problem.cameras, &state.cameras, &depths)?;
+    let cameras = camera_file::cameras(&problem.cameras, &state.cameras, &depths);
     let plates = plate_files::plates(&found.fit, series, &gauge)?;
     let poses = [("poses.csv".to_owned(), pose_files::poses_csv(&names, &found.free_poses))];
     let texts = cameras.into_iter().chain(plates).chain(poses);

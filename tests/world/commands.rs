@@ -673,3 +673,30 @@ fn a_series_without_images_has_no_tilt_of_the_plate() {
     record.series[0].name = "tracker".into();
     assert_eq!(parts(robotcal::cli::summary_of(&record)), 1);
 }
+
+/// Wide lenses on clean data: one whose numerator and denominator nearly say the same comes to an end, and one that ROS has no model for is written.
+#[test]
+fn wide_lenses_without_noise_of_any_kind_are_no_lost_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let made = |lens: &str, images: &str| {
+        let common = ["simulate", "--urdf", &urdf, "--observations", "--field-deg", "75", "--seed", "4", "-q"];
+        let output = robotcal(&[&common[..], &["--images", images, "--lens", lens, "--out", &path(lens)]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+        path(lens)
+    };
+    let (series, out) = (made("rational", "25"), path("found"));
+    let output =
+        robotcal(&["identify", "--urdf", &urdf, "--series", &series, "--camera", "rational", "--out", &out, "-q"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    let record = robotcal::output::solution_json::read(&std::fs::read(path("found/solution.json")).unwrap()).unwrap();
+    let parameters = &record.cameras[0].parameters;
+    let k6 = parameters.iter().find(|(name, _)| name == "k6").unwrap().1;
+    assert!((k6 - 0.012).abs() < 0.1, "far from its pole: {k6}");
+
+    let (series, out) = (made("thin_prism", "50"), path("poses"));
+    let output = robotcal(&["poses", "--series", &series, "--camera", "thin_prism", "--out", &out, "-q"]);
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{}", text(&output));
+    assert!(folder.path().join("poses/poses.csv").is_file());
+}
