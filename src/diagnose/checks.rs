@@ -6,7 +6,8 @@ use super::{
     camera_model, camera_pattern, contradicted_distances, exchanged_readings, extrapolates, few_images, focus,
     held_near_nominal, joint_noise, left_out_bodies, left_out_images, left_out_observations, length_standard, loose,
     many_left_out, marker_off, measurement_scatter, moved, no_gain, odd_image, parameter_off, plate_size, pose_step,
-    repeated_measurements, rounded_readings, scatter, shifted_measurements, small_gain, stated_noise, tag_size, undetermined, zeros_off,
+    repeated_measurements, rounded_readings, scatter, shifted_measurements, small_gain, stated_noise, tag_size,
+    undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};

@@ -1,9 +1,9 @@
 //! mastering.csv: joint offsets for the controller, and the robot that is left once it has them.
 
-use crate::series::to_csv;
 use super::{Context, Offsets};
 use crate::identify::Solution;
 use crate::model::robot::Robot;
+use crate::series::to_csv;
 use crate::urdf::JointKind;
 
 /// Sigma of an offset that is worth entering whatever the offset is: half a millimetre at a metre.

@@ -362,9 +362,9 @@ fn images_that_are_turned_among_others_are_listed_one_by_one() {
     for image in made.observations.iter_mut().step_by(3) {
         image.observations.iter_mut().for_each(|o| o.uv = [2.0 * cx - o.uv[0], 2.0 * cy - o.uv[1]]);
     }
-    let series = measured(&made, &chain());
+    let series = measured(&made, &kr6());
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
-    let said = match identify(chain(), std::slice::from_ref(&series), &options) {
+    let said = match identify(kr6(), std::slice::from_ref(&series), &options) {
         Err(refusal) => {
             assert_eq!(refusal.code, Code::ImagesTurned, "{refusal}");
             refusal.what
@@ -383,12 +383,12 @@ fn images_that_are_turned_among_others_are_listed_one_by_one() {
 #[test]
 fn readings_in_whole_degrees_are_named_and_no_move() {
     let made = seen(CameraMount::Hand, 40, 3);
-    let mut series = measured(&made, &chain());
+    let mut series = measured(&made, &kr6());
     for q in series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).flatten() {
         *q = q.to_degrees().round().to_radians();
     }
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
-    let solution = identify(chain(), &[series], &options).unwrap();
+    let solution = identify(kr6(), &[series], &options).unwrap();
     let found = solution.findings.iter().find(|f| f.code() == Code::ReadingsRounded && f.fails());
     let found = found.unwrap_or_else(|| panic!("{:?}", solution.findings));
     let quantity = |name: &str| found.quantities().into_iter().find(|q| q.name == name).unwrap().value;
@@ -403,7 +403,7 @@ fn readings_in_whole_degrees_are_named_and_no_move() {
 /// Names as programs sort them beside readings in the order of the stops, and the other way round.
 #[test]
 fn rows_in_the_other_order_of_their_names_are_named() {
-    let mut good = measured(&seen(CameraMount::Hand, 24, 3), &chain());
+    let mut good = measured(&seen(CameraMount::Hand, 24, 3), &kr6());
     good.stops.iter_mut().enumerate().for_each(|(k, stop)| stop.image = format!("{}.png", k + 1));
     let mut sorted: Vec<usize> = (0..24).collect();
     sorted.sort_by_key(|k| good.stops[*k].image.clone());

@@ -57,9 +57,9 @@ impl Dots {
         let all = || lattice.cells.values().map(|site| (site.relative_radius(&candidates[site.candidate]), site));
         let open = |(_, site): &(f64, &super::lattice::Site)| candidates[site.candidate].open;
         let is_open = 2 * all().filter(open).count() > lattice.cells.len();
-        let ratios = || all().filter(open).map(|(_, site)| candidates[site.candidate].hole.unwrap_or(0.5)).collect();
-        let ratio = if is_open { middle(ratios())? } else { 0.0 };
-        let radius = middle(all().filter(|dot| open(dot) == is_open).map(|(radius, _)| radius).collect())?;
+        let ratios = || all().filter(open).map(|(_, site)| candidates[site.candidate].hole.unwrap_or(0.5));
+        let ratio = if is_open { median(ratios())? } else { 0.0 };
+        let radius = median(all().filter(|dot| open(dot) == is_open).map(|(radius, _)| radius))?;
         Some(Self { usual: Dot { radius, ratio }, other: BTreeMap::new() })
     }
 
