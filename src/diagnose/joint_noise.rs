@@ -81,9 +81,12 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
             weight,
         })
     };
-    // Cameras at the same stops have one noise: it is said once.
-    let is_first = |k: usize| (0..k).all(|before| fit.problem.noise_of(before) != fit.problem.noise_of(k));
-    setting.series.iter().enumerate().filter(|(k, _)| is_first(*k)).filter_map(of_series).collect()
+    setting.series.iter().enumerate().filter(|(k, _)| says_noise_first(fit, *k)).filter_map(of_series).collect()
+}
+
+/// Cameras at the same stops have one noise: it is said once, of the first.
+pub(super) fn says_noise_first(fit: &Fit, series: usize) -> bool {
+    (0..series).all(|before| fit.problem.noise_of(before) != fit.problem.noise_of(series))
 }
 
 /// The reading with the largest joint noise in a series: its index, its name, and the size of the noise, rad or m.

@@ -3,10 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::agreement::{Agreement, Moved, agreement};
-use super::kind::{CheckContext, Kind, Quantity, Subject};
+use super::kind::{CheckContext, Kind, Quantity, Subject, some_of};
 use crate::error::Code;
 use crate::init::{HandEye, SeenStop};
 use crate::problem::{Adjustment, ImageRejection, Problem};
+
+/// Images that are named one by one; the subjects have all.
+const MOST_NAMED: usize = 12;
 
 /// Something is another at some images of a series, by so much that these do not fit the others.
 #[derive(Debug, Clone, PartialEq)]
@@ -123,7 +126,7 @@ impl Kind for BodyMoved {
         let [before, after] = &self.between;
         let images = if self.by_turns {
             // Between the first and the last stand others.
-            format!("{} images ({})", self.images.len(), self.images.join(", "))
+            format!("{} images ({})", self.images.len(), some_of(&self.images, MOST_NAMED))
         } else {
             format!(
                 "{} images, {} to {}",

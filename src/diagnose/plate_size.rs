@@ -83,10 +83,11 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
 }
 
 impl DoubtedSize {
-    /// Relative size of what is in doubt.
-    pub const fn relative(&self) -> f64 {
+    /// Relative size of what is in doubt: of a stretched plate of the length that is off most, where the links tell.
+    pub fn relative(&self) -> f64 {
         match self {
-            Self::Contradicted { off, .. } | Self::Uneven { off, .. } => off.abs(),
+            Self::Contradicted { off, .. } | Self::Uneven { off, along: None, .. } => off.abs(),
+            Self::Uneven { along: Some([x, y]), .. } => x.0.abs().max(y.0.abs()),
         }
     }
 }

@@ -1,11 +1,12 @@
 //! Were the readings rounded before they were written, and is that what the joint noise is?
 
-use super::joint_noise::noisiest_joint;
+use super::joint_noise::{noisiest_joint, says_noise_first};
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
 use crate::problem::Rounding;
+use crate::urdf::JointKind;
 
 /// All readings of a series are multiples of one step, which is as large as the joint noise says.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +17,8 @@ pub struct ReadingsRounded {
     pub rounding: Rounding,
     /// Joint noise that was found, rad.
     pub sigma_rad: f64,
+    /// True where there is no other series, of which the readings might be exact.
+    pub is_only: bool,
     /// Gate or note.
     pub weight: Weight,
 }
@@ -24,14 +27,18 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Read
     let limits = setting.limits;
     let kinds = &fit.state.robot.chain.reading_kinds;
     let of_series = |(k, of): (usize, &crate::problem::MeasuredSeries)| {
-        let (.., sigma_rad) = noisiest_joint(setting.with_noise_found(fit), k)?;
+        let (joint, _, sigma_rad) = noisiest_joint(setting.with_noise_found(fit), k)?;
+        if kinds[joint] != JointKind::Revolute || !says_noise_first(fit, k) {
+            return None;
+        }
         let rounding = Rounding::of(of, kinds).filter(|r| !of.readings_are_computed() && r.explains(sigma_rad))?;
         let weight = match sigma_rad {
             s if s > limits.joint_noise => Weight::Gate,
             s if s >= limits.unusual_joint_noise => Weight::Note,
             _ => return None,
         };
-        Some(ReadingsRounded { series: of.name.clone(), rounding, sigma_rad, weight })
+        let is_only = setting.series.len() == 1;
+        Some(ReadingsRounded { series: of.name.clone(), rounding, sigma_rad, is_only, weight })
     };
     setting.series.iter().enumerate().filter_map(of_series).collect()
 }
@@ -40,11 +47,13 @@ impl ReadingsRounded {
     /// What moves by less than a step did not move: readings that are off by as much look the same. Where the rounding is small enough to go on,
     /// moves are told as they are.
     pub(super) fn explains_moves(&self, by: &[Quantity]) -> bool {
-        let is_length = |q: &&Quantity| q.unit == "m" || q.unit == "rad";
-        let mut lengths = by.iter().filter(is_length).peekable();
-        self.weight == Weight::Gate
-            && lengths.peek().is_some()
-            && lengths.all(|q| q.value.abs() < self.rounding.step_rad)
+        let is_size = |q: &&Quantity| q.unit == "m" || q.unit == "rad";
+        let mut sizes = by.iter().filter(is_size).peekable();
+        // A step of a joint moves what stands a metre from its axis by as many metres as it has radians.
+        self.is_only
+            && self.weight == Weight::Gate
+            && sizes.peek().is_some()
+            && sizes.all(|q| q.value.abs() < self.rounding.step_rad)
     }
 }
 

@@ -72,7 +72,8 @@ impl Group<'_> {
         let problem = &self.adjustment.problem;
         let used = (0..self.group.len()).filter(|row| self.measured(*row).rejected.is_none());
         let usual = median(used.filter_map(|row| self.misfit(row, self.measured(row).stop)))?;
-        let own: Vec<usize> = (0..self.group.len()).map(|row| self.measured(row).stop).collect();
+        let mut own: Vec<usize> = (0..self.group.len()).map(|row| self.measured(row).stop).collect();
+        own.dedup();
         let all: Vec<usize> = (0..problem.stops.len()).collect();
         let ways = [&all, &own].into_iter().flat_map(|order| [true, false].map(|below| (order, below)));
         ways.filter_map(|(order, below)| self.run(order, below, usual, setting)).max_by_key(|found| found.rows)

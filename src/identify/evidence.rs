@@ -17,7 +17,7 @@ use super::solution::{Evidence, LensEvidence, Solution};
 use super::turns;
 use crate::assess::Limits;
 use crate::diagnose::{Finding, ToolInPoses, follows_from_tool};
-use crate::error::{Notice, Result};
+use crate::error::{Code, Notice, Result};
 use crate::fit::{Fit, NoEvidence, log_evidence_of_fit, log_evidence_of_outcome};
 use crate::linalg::SymmetricFactor;
 use crate::model::joint_terms::RobotModel;
@@ -181,7 +181,12 @@ fn not_compared(model: RobotModel, why: NoEvidence) -> Notice {
         RobotModel::Full => format!("has no evidence, and no smaller one takes its place: {why}"),
         _ => format!("has no evidence, and takes no part in the choice: {why}"),
     };
-    Notice::new(why.code(), model.title(), what, "name a robot model with --robot-model to have its own fit")
+    Notice::new(
+        Code::ModelNotCompared,
+        model.title(),
+        what,
+        "name a robot model with --robot-model to have its own fit",
+    )
 }
 
 /// What is known of every model that a fit of the full one holds: its evidence, and its optimum; and models that have none.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::body_placed::{SeenFrom, missed, placed};
-use super::points_start::{DISAGREES, Placed, lower_median};
+use super::points_start::{DISAGREES, Placed, lower_median, tip_at};
 use crate::assess::Limits;
 use crate::geom::Pose;
 use crate::problem::{Adjustment, BodyRejection, BodySeen, InstrumentKind, Problem};
@@ -27,11 +27,11 @@ pub(super) fn leave_out_repeated(adjustment: &mut Adjustment, limits: &Limits) {
 type Row = (usize, SeenFrom);
 
 /// Those of one body by one tracker.
-fn stuck(Adjustment { problem, state }: &Adjustment, group: &[usize], limits: &Limits) -> Vec<usize> {
+fn stuck(adjustment: &Adjustment, group: &[usize], limits: &Limits) -> Vec<usize> {
+    let problem = &adjustment.problem;
     let of = |&k: &usize| {
         let measured = &problem.body_measurements[k];
-        let posture = problem.stops[measured.stop].posture.as_ref()?;
-        Some((k, (measured.seen, state.robot.base_from_tip(&posture.readings))))
+        Some((k, (measured.seen, tip_at(adjustment, measured)?)))
     };
     let rows: Vec<Row> = group.iter().filter_map(of).collect();
     let runs: Vec<&[Row]> = rows.chunk_by(|a, b| is_again(problem, a, b)).collect();

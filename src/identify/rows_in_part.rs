@@ -75,7 +75,7 @@ pub(super) fn name_part(
     };
     let mistake = Mistake {
         kind: MistakeKind::Rows { below, columns: Vec::new(), part: Some(shifted) },
-        of: format!("{} {}", instrument.kind.block(), instrument.name),
+        of: instrument.place(),
         misfit: lower_median(misfits),
         misfit_undone: Some(part.misfit),
         by_images: false,

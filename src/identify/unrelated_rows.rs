@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::points_start::{FEWEST_POINTS, Placed, PointAt, distances, lower_median};
+use super::points_start::{FEWEST_POINTS, Placed, PointAt, distances, lower_median, point_at};
 use crate::assess::Limits;
 use crate::error::{Code, Error, Quantity, Result};
 use crate::problem::{Adjustment, InstrumentKind};
@@ -13,15 +13,12 @@ use crate::problem::{Adjustment, InstrumentKind};
 /// # Errors
 /// These measurements.
 pub(super) fn name_unrelated(
-    Adjustment { problem, state }: &Adjustment,
+    adjustment: &Adjustment,
     (measured, placed): (&[usize], &Placed),
     limits: &Limits,
 ) -> Result<()> {
-    let of = |&k: &usize| {
-        let measured = &problem.body_measurements[k];
-        let posture = problem.stops[measured.stop].posture.as_ref()?;
-        Some((measured.seen.position(), state.robot.base_from_tip(&posture.readings)))
-    };
+    let Adjustment { problem, state } = adjustment;
+    let of = |&k: &usize| point_at(adjustment, &problem.body_measurements[k]);
     let points: Vec<PointAt> = measured.iter().filter_map(of).collect();
     let Some(&first) = measured.first() else { return Ok(()) };
     let instrument = &problem.instruments[problem.body_measurements[first].instrument];
@@ -41,7 +38,7 @@ pub(super) fn name_unrelated(
         1e3 * apart
     );
     let remedy = "look whether joints.csv and the table of the tracker are of one session and one robot, and that each row names its own stop";
-    let place = format!("{} {}", instrument.kind.block(), instrument.name);
+    let place = instrument.place();
     let quantities = vec![Quantity::new("misfit", misfit, "m"), Quantity::new("apart", apart, "m")];
     Err(Error { quantities, ..Error::new(Code::ReadingsContradict, place, what, remedy) })
 }

@@ -103,6 +103,7 @@ fn is_information(code: Code) -> bool {
             | Code::ImagesInMotion
             | Code::JointUnused
             | Code::LensChosen
+            | Code::ModelNotCompared
             | Code::ObservationsMissing
             | Code::RepeatabilityUnused
             | Code::SecondArmRenamed

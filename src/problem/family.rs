@@ -85,6 +85,15 @@ impl Family {
         ((squares + self.drawn) / (determined + self.drawn)).sqrt()
     }
 
+    /// What the prior of the factor adds to the log evidence: its density, relative to that of the factor 1, under a scaled inverse chi-squared
+    /// prior with `drawn` degrees of freedom. Of coefficients of a lens alone, as models that are compared have all other families in common.
+    pub fn log_density_of_factor(&self) -> f64 {
+        match self.is_of_formula() {
+            true => -self.drawn * (self.factor.ln() + 0.5 * (self.factor.powi(-2) - 1.0)),
+            false => 0.0,
+        }
+    }
+
     /// A family of columns at their present priors.
     pub fn new(name: &str, layout: &Layout, columns: Vec<usize>) -> Self {
         let base = columns.iter().map(|&c| layout.columns[c].prior_sigma).collect();

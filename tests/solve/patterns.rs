@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use robotcal::assess::{Limits, Pattern, cause, patterns};
-use robotcal::diagnose::{ResidualPattern, residual_pattern};
+use robotcal::diagnose::{Finding, ResidualPattern, residual_pattern};
 use robotcal::fit::Fit;
 use robotcal::identify::{Options, RobotModel, Solution, identify, stand_alone};
 use robotcal::model::camera::{Camera, Lens};
@@ -133,13 +133,34 @@ fn of_steps_that_take_more_than_there_is_the_simplest_names_the_cause() {
 
 /// The coefficients of a thin prism have priors, which this lens is far beyond: the data widen them, and no pattern is left.
 #[test]
-fn a_lens_that_was_taken_is_not_the_remedy() {
+fn lenses_with_terms_of_the_fault_leave_no_pattern() {
     let limits = Limits::default();
     for (fault, is_fitted) in [(Fault::ThinPrism(8e-3), None), (Fault::Parallax(2e-3), None)] {
         let seen = MeasuredSeries { lens: fault.lens(), ..seen(&world(fault, 4)) };
         let found = residual_pattern(&stand_alone(&[seen], &limits).unwrap().fit, &limits);
         println!("seed 4 {fault:?}: {found:?}");
         assert_eq!(found.map(|f| f.is_fitted), is_fitted, "{fault:?}");
+    }
+}
+
+/// A remedy names no lens that is there, nor one that was tried and has less evidence.
+#[test]
+fn a_lens_that_was_taken_or_tried_is_not_the_remedy() {
+    let limits = Limits::default();
+    let found =
+        residual_pattern(&stand_alone(&[seen(&world(Fault::ThinPrism(8e-3), 4))], &limits).unwrap().fit, &limits);
+    let found = found.unwrap();
+    let [name, field] = ["thin_prism", "brown+field"];
+    for (is_fitted, tried, named) in [
+        (false, vec![], Some(name)),
+        (true, vec![], Some(field)),
+        (false, vec![Lens::ThinPrism], None),
+        (true, vec![Lens::BrownField], None),
+    ] {
+        let remedy = Finding::from(ResidualPattern { is_fitted, tried, ..found.clone() }).remedy();
+        for lens in [name, field] {
+            assert_eq!(remedy.contains(lens), named == Some(lens), "{remedy}");
+        }
     }
 }
 

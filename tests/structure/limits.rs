@@ -71,6 +71,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("diagnose/length_standard.rs FOUND", "convergence"),
     ("diagnose/length_standard.rs ROUNDS", "most iterations"),
     ("diagnose/loose.rs MOST_IMAGES", "how many are named"),
+    ("diagnose/moved.rs MOST_NAMED", "how many are named"),
     ("diagnose/plate_size.rs ASPECT", "index of a mode"),
     ("diagnose/plate_size.rs MOST_STOPS", "samples of a fit"),
     ("diagnose/step_rows.rs LEFT", "rounding"),
