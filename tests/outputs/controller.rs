@@ -7,7 +7,7 @@ use crate::outputs_support::{context, robot, series, series_in_postures, solved}
 use nalgebra::{Matrix4, Vector3, Vector6};
 use robotcal::Code;
 use robotcal::geom::{Pose, exp_so3};
-use robotcal::identify::{Options, RobotModel, Selection, identify};
+use robotcal::identify::{Options, RobotModel, Selection, Solution, identify};
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
 use robotcal::output::difference::compare_solutions;
@@ -110,10 +110,19 @@ fn an_offset_that_was_held_is_not_determined() {
     assert_eq!((row["sigma"].as_str(), row["determined"].as_str()), ("", "no"), "{row:?}");
 }
 
+/// With offsets of every size, of joints that are determined and of those that are not.
+fn solved_with_offsets(model: RobotModel, description: &RobotDescription) -> Solution {
+    let mut solution = solved(CameraMount::Hand, model, description);
+    for t in solution.fit.state.robot.terms.iter_mut().filter(|t| t.term == Term::Offset) {
+        t.value += 1e-3 * (t.reading as f64 + 1.0);
+    }
+    solution
+}
+
 #[test]
 fn offsets_in_the_controller_or_in_the_origins_are_the_same_robot() {
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let solution = solved_with_offsets(RobotModel::Full, &description);
     let folded = files(&solution, &context(&description)).unwrap();
     let mut mastering = context(&description);
     mastering.offsets = Offsets::Mastering;
@@ -150,12 +159,8 @@ fn offsets_in_the_controller_or_in_the_origins_are_the_same_robot() {
 #[test]
 fn a_controller_that_took_the_determined_offsets_has_the_robot_that_was_found() {
     let description = robot();
-    let mut solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
-    // Offsets of every size, of joints that are determined and of those that are not.
+    let solution = solved_with_offsets(RobotModel::Rigid, &description);
     let readings = description.chain(None, None).unwrap().readings.len();
-    for t in solution.fit.state.robot.terms.iter_mut().filter(|t| t.term == Term::Offset) {
-        t.value += 1e-3 * (t.reading as f64 + 1.0);
-    }
     let mut mastering = context(&description);
     mastering.offsets = Offsets::Mastering;
     let files = files(&solution, &mastering).unwrap();
