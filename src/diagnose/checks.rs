@@ -75,7 +75,7 @@ pub const CHECKS: &[Check] = &[
                 | Finding::FocusChange(_)
                 | Finding::BodyMoved(_)
                 | Finding::ZeroMoved(_),
-            ) => own.explains_moves(&other.quantities()),
+            ) => own.explains_moves(),
             _ => false,
         },
         ..check("rounded_readings", Stage::Fit(|a, b, s| found(rounded_readings::check(a, b, s))))

@@ -17,7 +17,7 @@ pub struct ReadingsRounded {
     pub rounding: Rounding,
     /// Joint noise that was found, rad.
     pub sigma_rad: f64,
-    /// True where there is no other series, of which the readings might be exact.
+    /// True where there are no readings of other stops, which might be exact.
     pub is_only: bool,
     /// Gate or note.
     pub weight: Weight,
@@ -37,23 +37,17 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Read
             s if s >= limits.unusual_joint_noise => Weight::Note,
             _ => return None,
         };
-        let is_only = setting.series.len() == 1;
+        let is_only = (0..setting.series.len()).filter(|k| says_noise_first(fit, *k)).count() == 1;
         Some(ReadingsRounded { series: of.name.clone(), rounding, sigma_rad, is_only, weight })
     };
     setting.series.iter().enumerate().filter_map(of_series).collect()
 }
 
 impl ReadingsRounded {
-    /// What moves by less than a step did not move: readings that are off by as much look the same. Where the rounding is small enough to go on,
-    /// moves are told as they are.
-    pub(super) fn explains_moves(&self, by: &[Quantity]) -> bool {
-        let is_size = |q: &&Quantity| q.unit == "m" || q.unit == "rad";
-        let mut sizes = by.iter().filter(is_size).peekable();
-        // A step of a joint moves what stands a metre from its axis by as many metres as it has radians.
-        self.is_only
-            && self.weight == Weight::Gate
-            && sizes.peek().is_some()
-            && sizes.all(|q| q.value.abs() < self.rounding.step_rad)
+    /// The noise that was found without any move is that of the rounding: nothing is left that moves would explain. Where the rounding is small
+    /// enough to go on, moves are told as they are.
+    pub(super) fn explains_moves(&self) -> bool {
+        self.is_only && self.weight == Weight::Gate
     }
 }
 
