@@ -88,13 +88,15 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     };
     postures.iter_mut().for_each(|p| p.time_ns += later_ns);
     let begin_ns = samples.iter().map(|s| s.time_ns).min().unwrap_or_default();
-    scan.notices.extend(Gaps::of(&samples, &joints).leave_out(recording, begin_ns, later_ns, &mut times));
+    let is_open = told == Told::Open && options.clock == Clock::Stamp && image_delay_s.abs() > NOTABLE_DELAY_S;
+    let open = if is_open { nanoseconds(-image_delay_s) } else { 0 };
+    let still_speeds: Vec<f64> = factors.iter().map(|factor| options.still_speed / factor).collect();
+    let later = (later_ns + open.min(0), later_ns + open.max(0));
+    scan.notices.extend(Gaps::of(&samples, &joints, &still_speeds).leave_out(recording, begin_ns, later, &mut times));
     let late = told.late();
     scan.notices.extend(late.map(|d| d.notice(recording)));
     let growth_s = scan.delay_growth_s(&image_topic) - scan.delay_growth_s(&topics[0]);
-    let is_open = told == Told::Open && options.clock == Clock::Stamp && image_delay_s.abs() > NOTABLE_DELAY_S;
-    let open_s = if is_open { -image_delay_s } else { 0.0 };
-    let groups = groups(&mut scan, &postures, &times, options, nanoseconds(open_s)).map_err(|error| {
+    let groups = groups(&mut scan, &postures, &times, options, open).map_err(|error| {
         let never_still = error.code == Code::RobotNeverStill;
         // Degrees are as many times too fast as radians.
         seems_degrees

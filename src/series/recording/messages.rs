@@ -25,7 +25,7 @@ pub(super) fn stamp_of(message: &[u8]) -> Decoded<i64> {
 pub(super) struct JointState {
     pub stamp_ns: i64,
     pub names: Vec<String>,
-    /// rad or m.
+    /// As recorded: angles in rad or deg, lengths in m.
     pub positions: Vec<f64>,
 }
 
@@ -45,6 +45,12 @@ impl JointState {
         let both = self.names.into_iter().zip(self.positions).filter(|(_, q)| q.is_finite());
         let (names, positions) = both.unzip();
         Self { stamp_ns: self.stamp_ns, names, positions }
+    }
+
+    /// The joints whose position is no number.
+    pub fn not_finite(&self) -> Vec<String> {
+        let both = self.names.iter().zip(&self.positions).filter(|(_, q)| !q.is_finite());
+        both.map(|(name, _)| name.clone()).collect()
     }
 }
 

@@ -21,8 +21,10 @@ use crate::series::InputFile;
 pub(super) struct JointSample {
     pub time_ns: i64,
     pub names: Rc<Vec<String>>,
-    /// rad or m.
+    /// As recorded: angles in rad or deg, lengths in m.
     pub positions: Vec<f64>,
+    /// Joints of the message without a position that is a number.
+    pub unread: Rc<Vec<String>>,
 }
 
 /// The joint states of a robot.
@@ -99,6 +101,17 @@ pub(super) fn time_ns(stamp_ns: i64, message: &Message<'_>, clock: Clock) -> i64
     }
 }
 
+/// The names of the last sample where they are the same; memory that others need is added to `held`.
+fn shared(last: Option<&Rc<Vec<String>>>, names: Vec<String>, held: &mut usize) -> Rc<Vec<String>> {
+    match last {
+        Some(last) if **last == names => Rc::clone(last),
+        _ => {
+            *held += names.iter().map(|n| n.len() + size_of::<String>()).sum::<usize>();
+            Rc::new(names)
+        }
+    }
+}
+
 impl Scan {
     fn note(&mut self, message: &Message<'_>, clock: Clock) {
         let topic = self.topics.entry(message.topic.to_string()).or_default();
@@ -122,25 +135,20 @@ impl Scan {
         match message.schema {
             messages::JOINT_STATE => {
                 let state = JointState::read(message.data)?;
-                let had_positions = !state.positions.is_empty();
+                let unread = state.not_finite();
                 let state = state.finite();
                 let time_ns = self.stamped(message, state.stamp_ns, clock);
                 if state.positions.is_empty() {
-                    return if had_positions { Err("has no position that is finite".into()) } else { Ok(()) };
+                    return if unread.is_empty() { Ok(()) } else { self.unread(message.topic, time_ns, unread) };
                 }
                 let samples = self.joints.entry(message.topic.to_string()).or_default();
-                let names = match samples.last() {
-                    Some(last) if *last.names == state.names => Rc::clone(&last.names),
-                    _ => {
-                        self.held += state.names.iter().map(|n| n.len() + size_of::<String>()).sum::<usize>();
-                        Rc::new(state.names)
-                    }
-                };
+                let names = shared(samples.last().map(|last| &last.names), state.names, &mut self.held);
+                let unread = shared(samples.last().map(|last| &last.unread), unread, &mut self.held);
                 self.held += size_of::<JointSample>() + size_of_val(&state.positions[..]);
                 if self.held > MOST_HELD {
                     return Ok(());
                 }
-                samples.push(JointSample { time_ns, names, positions: state.positions });
+                samples.push(JointSample { time_ns, names, positions: state.positions, unread });
             }
             messages::IMAGE | messages::COMPRESSED_IMAGE => {
                 let time_ns = self.stamped(message, messages::stamp_of(message.data)?, clock);
@@ -152,6 +160,18 @@ impl Scan {
             _ => {}
         }
         Ok(())
+    }
+
+    /// Notes that a topic whose joints were read before was written without one of them.
+    fn unread(&mut self, topic: &str, time_ns: i64, joints: Vec<String>) -> Decoded<()> {
+        if let Some(samples) = self.joints.get_mut(topic) {
+            let unread = shared(samples.last().map(|last| &last.unread), joints, &mut self.held);
+            self.held += size_of::<JointSample>();
+            if self.held <= MOST_HELD {
+                samples.push(JointSample { time_ns, names: Rc::default(), positions: Vec::new(), unread });
+            }
+        }
+        Err("has no position that is finite".into())
     }
 
     fn stamped(&mut self, message: &Message<'_>, stamp_ns: i64, clock: Clock) -> i64 {
@@ -405,6 +425,7 @@ mod tests {
         for (data, topic) in [
             (joint_state(&[("gripper", f64::NAN), ("a", 0.5), ("b", -0.25)]), "/joints"),
             (joint_state(&[("gripper", f64::NAN)]), "/gripper"),
+            (joint_state(&[("a", f64::NAN), ("b", f64::NAN)]), "/joints"),
         ] {
             let schema = messages::JOINT_STATE;
             scan.note(&Message { topic, schema, encoding: "cdr", log_time_ns: 1, data: &data }, Clock::Stamp);
@@ -414,7 +435,9 @@ mod tests {
             (sample.names.as_slice(), sample.positions.as_slice()),
             (&["a".to_owned(), "b".to_owned()][..], &[0.5, -0.25][..])
         );
-        assert_eq!(scan.topics["/joints"].malformed, 0);
+        let (unread, nothing) = (&scan.joints["/joints"][1].unread, &scan.joints["/joints"][1].names);
+        assert_eq!((unread.as_slice(), nothing.len()), (&["a".to_owned(), "b".to_owned()][..], 0));
+        assert_eq!(scan.topics["/joints"].malformed, 1);
         assert_eq!((scan.topics["/gripper"].malformed, scan.joints.contains_key("/gripper")), (1, false));
     }
 

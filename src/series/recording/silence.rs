@@ -1,6 +1,7 @@
 //! Times in which joints are not known because their publisher fell silent.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -55,36 +56,86 @@ const MISSING_STEPS: i64 = 3;
 #[derive(Debug, Default)]
 pub(super) struct Gaps<'a>(BTreeMap<&'a str, Vec<Span>>);
 
-impl<'a> Gaps<'a> {
-    pub fn of(samples: &[JointSample], joints: &'a [String]) -> Self {
-        let mut all: Vec<i64> = samples.iter().map(|s| s.time_ns).collect();
-        all.sort_unstable();
-        let of_joint = |joint: &'a String| {
-            let mut own: Vec<i64> = samples.iter().filter(|s| s.names.contains(joint)).map(|s| s.time_ns).collect();
-            own.sort_unstable();
-            let mut steps: Vec<i64> = own.windows(2).map(|w| w[1] - w[0]).collect();
-            steps.sort_unstable();
-            let least = steps.get(steps.len() / 2).map_or(i64::MAX, |usual| WINDOW_NS.max(MISSING_STEPS * usual));
-            let is_gap = |w: &&[i64]| {
-                let span = w[1] - w[0];
-                // Not those that all joints have.
-                let middle = w[0] + span / 4..w[1] - span / 4;
-                let next = all.partition_point(|t| *t < middle.start);
-                (least + 1..=LONGEST_GAP_NS).contains(&span) && all.get(next).is_some_and(|t| middle.contains(t))
-            };
-            let gaps: Vec<Span> = own.windows(2).filter(is_gap).map(|w| (w[0], w[1])).collect();
-            (!gaps.is_empty()).then_some((joint.as_str(), gaps))
+/// The readings of one joint, in the order of time.
+struct Own<'a> {
+    readings: Vec<(i64, f64)>,
+    /// Times at which its publisher told others and not it.
+    untold: Vec<i64>,
+    /// Times of all samples.
+    all: &'a [i64],
+    /// Slower than this it stands, in units of its readings.
+    still_speed: f64,
+}
+
+impl<'a> Own<'a> {
+    fn of(samples: &[JointSample], all: &'a [i64], joint: &String, still_speed: f64) -> Self {
+        let reading = |s: &JointSample| {
+            let at = s.names.iter().position(|name| name == joint)?;
+            Some((s.time_ns, s.positions[at]))
         };
-        Self(joints.iter().filter_map(of_joint).collect())
+        let mut readings: Vec<(i64, f64)> = samples.iter().filter_map(reading).collect();
+        readings.sort_by_key(|(time_ns, _)| *time_ns);
+        let beside: BTreeSet<&String> =
+            samples.iter().filter(|s| s.names.contains(joint)).flat_map(|s| s.names.iter()).collect();
+        let lacks = |s: &&JointSample| {
+            !s.names.contains(joint) && (s.unread.contains(joint) || s.names.iter().any(|name| beside.contains(name)))
+        };
+        let mut untold: Vec<i64> = samples.iter().filter(lacks).map(|s| s.time_ns).collect();
+        untold.sort_unstable();
+        Self { readings, untold, all, still_speed }
     }
 
-    /// Leaves out the images of these times, where joints are later by `later_ns` in the time of the images, and says so.
-    pub fn leave_out(&self, recording: &Path, begin_ns: i64, later_ns: i64, images: &mut Vec<i64>) -> Vec<Notice> {
+    fn gaps(&self) -> Vec<Span> {
+        let mut steps: Vec<i64> = self.readings.windows(2).map(|w| w[1].0 - w[0].0).collect();
+        steps.sort_unstable();
+        let least = steps.get(steps.len() / 2).map_or(WINDOW_NS, |usual| WINDOW_NS.max(MISSING_STEPS * usual));
+        let between = self.readings.windows(2).map(|w| (w[0].0, w[1].0, self.moved(w[0], w[1])));
+        // Nobody knows where it went in the end; a publisher that sends less while nothing moves may be silent as long as before.
+        let longest = steps.last().copied().unwrap_or(0);
+        let end = self.readings.last().zip(self.all.last());
+        let end = end.map(|((from, _), to)| (*from, *to + 1, to - from > longest));
+        let is_gap = |&(from, to, moved): &(i64, i64, bool)| {
+            let (span, inside) = (to - from, from + 1..to);
+            // Not those that all joints have.
+            let middle = from + span / 4..to - span / 4;
+            span > least
+                && (has(&self.untold, &inside)
+                    || (span > LONGEST_GAP_NS && has(self.all, &inside))
+                    || (moved && has(self.all, &middle)))
+        };
+        between.chain(end).filter(is_gap).map(|(from, to, _)| (from, to)).collect()
+    }
+
+    fn moved(&self, (from, before): (i64, f64), (to, after): (i64, f64)) -> bool {
+        (after - before).abs() > self.still_speed * (to - from) as f64 * 1e-9
+    }
+}
+
+/// One of the times, which are in order, is in the range.
+fn has(times: &[i64], range: &Range<i64>) -> bool {
+    times.get(times.partition_point(|t| *t < range.start)).is_some_and(|t| range.contains(t))
+}
+
+impl<'a> Gaps<'a> {
+    /// A joint whose publisher sends less often while it stands has none; `still_speeds`: of each joint, in the units of its readings.
+    pub fn of(samples: &[JointSample], joints: &'a [String], still_speeds: &[f64]) -> Self {
+        let mut all: Vec<i64> = samples.iter().map(|s| s.time_ns).collect();
+        all.sort_unstable();
+        let of_joint = |(joint, still_speed): (&'a String, &f64)| {
+            let gaps = Own::of(samples, &all, joint, *still_speed).gaps();
+            (!gaps.is_empty()).then_some((joint.as_str(), gaps))
+        };
+        Self(joints.iter().zip(still_speeds).filter_map(of_joint).collect())
+    }
+
+    /// Leaves out the images of these times, where joints are later by `later_ns` (at least, at most) in the time of the images, and says
+    /// so of those that are not told by [`notices`].
+    pub fn leave_out(&self, recording: &Path, begin_ns: i64, later_ns: Span, images: &mut Vec<i64>) -> Vec<Notice> {
         let all = images.clone();
-        let is_in = |t: i64, (from, to): &Span| (from + later_ns + 1..to + later_ns).contains(&t);
+        let is_in = |t: i64, (from, to): &Span| (from + later_ns.0 + 1..to + later_ns.1).contains(&t);
         images.retain(|t| !self.0.values().flatten().any(|gap| is_in(*t, gap)));
         let told = self.0.iter().filter_map(|(joint, gaps)| {
-            let lost = |gap: &&Span| all.iter().any(|t| is_in(*t, gap));
+            let lost = |gap: &&Span| gap.1 - gap.0 <= LONGEST_GAP_NS && all.iter().any(|t| is_in(*t, gap));
             let with_images: Vec<&Span> = gaps.iter().filter(lost).collect();
             let count = all.iter().filter(|t| with_images.iter().any(|gap| is_in(**t, gap))).count();
             let seconds = |ns: i64| ns.saturating_sub(begin_ns) as f64 * 1e-9;
@@ -110,6 +161,8 @@ mod tests {
     use super::*;
 
     const SECOND: i64 = 1_000_000_000;
+    const HUNDREDTH: i64 = SECOND / 100;
+    const STILL: [f64; 2] = [5e-3; 2];
 
     #[test]
     fn joints_that_fall_silent_are_named_with_the_images_that_are_lost() {
@@ -117,6 +170,7 @@ mod tests {
             time_ns: tenth * SECOND / 10,
             names: Rc::new(vec![joint.to_owned()]),
             positions: vec![0.0],
+            unread: Rc::default(),
         };
         // "b" pauses for half a second, then ends after four seconds of ten.
         let of_b = (0..40).filter(|tenth| !(20..24).contains(tenth));
@@ -138,18 +192,78 @@ mod tests {
         let at = |hundredth: i64| {
             let names = if (101..134).contains(&hundredth) { &a } else { &both };
             let positions = vec![0.0; names.len()];
-            JointSample { time_ns: hundredth * SECOND / 100, names: Rc::clone(names), positions }
+            JointSample { time_ns: hundredth * SECOND / 100, names: Rc::clone(names), positions, unread: Rc::default() }
         };
         let samples: Vec<_> = (0..300).filter(|k| !(181..220).contains(k)).map(at).collect();
         let joints = ["a".to_owned(), "b".to_owned()];
-        let gaps = Gaps::of(&samples, &joints);
+        let gaps = Gaps::of(&samples, &joints, &STILL);
         assert_eq!(gaps.0, BTreeMap::from([("b", vec![(SECOND, 134 * SECOND / 100)])]));
         let mut images: Vec<i64> = [90, 110, 120, 140, 200].iter().map(|k| k * SECOND / 100).collect();
-        let told = gaps.leave_out(Path::new("run.mcap"), 0, 0, &mut images);
+        let told = gaps.leave_out(Path::new("run.mcap"), 0, (0, 0), &mut images);
         assert_eq!(images, [90, 140, 200].map(|k| k * SECOND / 100));
         assert_eq!(told.iter().map(|n| n.code).collect::<Vec<_>>(), [Code::JointSilent]);
         let mut later: Vec<i64> = vec![140 * SECOND / 100];
-        assert_eq!(gaps.leave_out(Path::new("run.mcap"), 0, SECOND / 5, &mut later).len(), 1);
+        assert_eq!(gaps.leave_out(Path::new("run.mcap"), 0, (SECOND / 5, SECOND / 5), &mut later).len(), 1);
         assert_eq!(later, [] as [i64; 0]);
+    }
+
+    /// Joints at times in hundredths of a second, each with what is told of it.
+    fn sample(hundredth: i64, told: &[(&str, f64)], unread: &[&str]) -> JointSample {
+        let names = |joints: Vec<&str>| Rc::new(joints.into_iter().map(str::to_owned).collect::<Vec<_>>());
+        JointSample {
+            time_ns: hundredth * HUNDREDTH,
+            names: names(told.iter().map(|(joint, _)| *joint).collect()),
+            positions: told.iter().map(|(_, position)| *position).collect(),
+            unread: names(unread.to_vec()),
+        }
+    }
+
+    /// "b" is NaN for 1.2 s, and from 2.5 s to the end; alone on its topic or beside "a". None of it is a time with readings.
+    #[test]
+    fn long_silences_and_those_at_the_end_are_gaps_from_their_first_moment() {
+        let joints = ["a".to_owned(), "b".to_owned()];
+        let lacks = |k: i64| (101..220).contains(&k) || k >= 250;
+        let beside = |k: i64| match lacks(k) {
+            true => vec![sample(k, &[("a", 0.0)], &["b"])],
+            false => vec![sample(k, &[("a", 0.0), ("b", 0.0)], &[])],
+        };
+        let alone = |k: i64| {
+            let b = if lacks(k) { sample(k, &[], &["b"]) } else { sample(k, &[("b", 0.0)], &[]) };
+            vec![sample(k, &[("a", 0.0)], &[]), b]
+        };
+        for samples in [(0..=300).flat_map(beside).collect::<Vec<_>>(), (0..=300).flat_map(alone).collect()] {
+            let gaps = Gaps::of(&samples, &joints, &STILL);
+            let expected = vec![(100 * HUNDREDTH, 220 * HUNDREDTH), (249 * HUNDREDTH, 300 * HUNDREDTH + 1)];
+            assert_eq!(gaps.0, BTreeMap::from([("b", expected)]));
+            let mut images: Vec<i64> = [90, 110, 180, 230, 260, 300].map(|k| k * HUNDREDTH).to_vec();
+            let told = gaps.leave_out(Path::new("run.mcap"), 0, (0, 0), &mut images);
+            assert_eq!((images, told.len()), ([90, 230].map(|k| k * HUNDREDTH).to_vec(), 1));
+        }
+    }
+
+    /// Where it is open by which clock, images of either are left out.
+    #[test]
+    fn a_gap_lasts_by_both_clocks_where_it_is_open_which_is_right() {
+        let gaps = Gaps(BTreeMap::from([("b", vec![(SECOND, 2 * SECOND)])]));
+        let mut images: Vec<i64> = [70, 90, 150, 199, 210].map(|k| k * HUNDREDTH).to_vec();
+        gaps.leave_out(Path::new("run.mcap"), 0, (-SECOND / 5, 0), &mut images);
+        assert_eq!(images, [70, 210].map(|k| k * HUNDREDTH));
+    }
+
+    /// "b" is told 50 times a second while it moves and twice while it stands, up to the end; "a" 100 times.
+    #[test]
+    fn a_publisher_that_sends_less_while_nothing_moves_leaves_no_gap() {
+        let joints = ["a".to_owned(), "b".to_owned()];
+        let b = |k: i64| ((k % 2 == 0 && k <= 400) || k % 50 == 0).then_some(1e-3 * k.min(400) as f64);
+        let recorded = |jump: f64| -> Vec<JointSample> {
+            let at = |k: i64| {
+                let b = b(k).map(|q| sample(k, &[("b", if k >= 600 { q + jump } else { q })], &[]));
+                [Some(sample(k, &[("a", 0.0)], &[])), b]
+            };
+            (0..=830).flat_map(at).flatten().collect()
+        };
+        assert_eq!(Gaps::of(&recorded(0.0), &joints, &STILL).0, BTreeMap::new());
+        let moved = BTreeMap::from([("b", vec![(550 * HUNDREDTH, 600 * HUNDREDTH)])]);
+        assert_eq!(Gaps::of(&recorded(0.1), &joints, &STILL).0, moved);
     }
 }
