@@ -16,10 +16,12 @@ impl Series {
     /// As [`extract`].
     pub fn with_recording(mut self, images: &Path, options: &RecordingOptions) -> Result<Self> {
         let Source::Recording(recording) = &self.source else { return Ok(self) };
-        let options = RecordingOptions { joint_unit: self.manifest.joint_unit, ..options.clone() };
+        let joint_unit = self.manifest.joint_unit.or(options.joint_unit);
+        let options = RecordingOptions { joint_unit, ..options.clone() };
         let extracted = extract(recording, images, &options)?;
         let (dark, white) = optional_images(&self.folder)?;
         let written = self.manifest_file();
+        self.manifest.joint_unit = joint_unit;
         self.source = Source::Images { folder: images.to_path_buf(), dark, white };
         self.notices.extend(extracted.notices);
         self.notices.extend(settle_unit(&mut self.manifest, extracted.joint_unit, &self.folder, &written));
@@ -37,7 +39,8 @@ fn settle_unit(manifest: &mut Manifest, recorded: AngleUnit, recording: &Path, w
         return None;
     }
     manifest.joint_unit = Some(AngleUnit::Rad);
-    let what = "joint_unit is deg, but its joint states are all within a turn in radians, in which ROS has them, and are taken so";
+    let what =
+        "joint_unit is deg, but its joint states are within a turn in radians, in which ROS has them, and are taken so";
     let remedy = format!("write joint_unit = \"rad\" in {}", written.display());
     Some(Notice::new(Code::RadiansAsDegrees, recording.display(), what, remedy))
 }
@@ -90,10 +93,10 @@ pub fn convert_recording(recording: &Path, folder: &Path, options: &RecordingOpt
 fn write_folder(recording: &Path, unfinished: &Path, folder: &Path, options: &RecordingOptions) -> Result<Extracted> {
     // What is wrong with the manifest is said when it is carried over.
     let beside = manifest_beside(recording).ok().and_then(|path| Manifest::read(&path, &mut Vec::new()).ok());
-    let joint_unit = beside.and_then(|manifest| manifest.joint_unit);
+    let joint_unit = beside.and_then(|manifest| manifest.joint_unit).or(options.joint_unit);
     let options = RecordingOptions { joint_unit, ..options.clone() };
     let mut extracted = extract(recording, &unfinished.join("images"), &options)?;
-    let manifest = carried_manifest(recording, unfinished, &mut extracted)?;
+    let manifest = carried_manifest(recording, unfinished, joint_unit, &mut extracted)?;
     write(&unfinished.join("series.toml"), manifest.as_bytes())?;
     write(&unfinished.join("joints.csv"), extracted.stops.to_csv().as_bytes())?;
     if unfinished != folder {
@@ -107,7 +110,12 @@ fn write_folder(recording: &Path, unfinished: &Path, folder: &Path, options: &Re
 
 /// Text of the manifest for the folder, with its plate copied. Where there is none beside the recording, it does not say where
 /// the camera is: nobody knows, and a guess would look like knowledge.
-fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extracted) -> Result<String> {
+fn carried_manifest(
+    recording: &Path,
+    unfinished: &Path,
+    stated: Option<AngleUnit>,
+    extracted: &mut Extracted,
+) -> Result<String> {
     let beside = manifest_beside(recording);
     let written = beside.clone().unwrap_or_else(|_| unfinished.join("series.toml"));
     let known = beside.is_ok();
@@ -127,10 +135,10 @@ fn carried_manifest(recording: &Path, unfinished: &Path, extracted: &mut Extract
         }
     };
     manifest.mcap = None;
-    let is_stated = known && manifest.joint_unit.is_some();
+    manifest.joint_unit = stated;
     extracted.notices.extend(settle_unit(&mut manifest, extracted.joint_unit, recording, &written));
     fill_camera(&mut manifest, extracted.camera_info.as_ref());
-    if extracted.is_unit_in_doubt && !is_stated {
+    if extracted.is_unit_in_doubt && stated.is_none() {
         // Nobody knows: the folder is refused until someone states it.
         manifest.joint_unit = None;
     }

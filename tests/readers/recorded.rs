@@ -110,6 +110,23 @@ fn joint_states_are_radians_though_the_manifest_beside_them_says_degrees() {
     assert_eq!(read(&converted).unwrap().joint_unit(), AngleUnit::Rad);
 }
 
+/// What a caller states counts where no manifest does, and is judged as what a manifest states.
+#[test]
+fn a_unit_that_the_caller_states_is_not_lost() {
+    let stated = RecordingOptions { joint_unit: Some(AngleUnit::Deg), ..RecordingOptions::default() };
+    for (unit, is_doubted) in [("", true), ("joint_unit = \"rad\"\n", false)] {
+        let folder = recorded("run.toml", &format!("{MANIFEST}{unit}"));
+        let path = folder.path().join("run.mcap");
+        let direct = read(&path).unwrap().with_recording(&folder.path().join("pictures"), &stated).unwrap();
+        let extracted = convert_recording(&path, &folder.path().join("series"), &stated).unwrap();
+        for notices in [&direct.notices, &extracted.notices] {
+            assert_eq!(notices.iter().any(|n| n.code == Code::RadiansAsDegrees), is_doubted, "{notices:?}");
+        }
+        assert_eq!(direct.joint_unit(), AngleUnit::Rad);
+        assert_eq!(read(&folder.path().join("series")).unwrap().joint_unit(), AngleUnit::Rad);
+    }
+}
+
 #[test]
 fn a_manifest_may_name_its_recording() {
     let folder = recorded("series.toml", &format!("{MANIFEST}mcap = \"run.mcap\"\n"));

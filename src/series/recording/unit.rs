@@ -15,12 +15,15 @@ const STRIDE_NS: i64 = 50_000_000;
 /// Least number of strides that are too fast, and their least share of those in motion.
 const LEAST_FAST: usize = 10;
 const FAST_SHARE: f64 = 0.1;
+/// Readings beyond a turn that are no more than this are stray ones: a robot that waits near zero for most of the time goes further for more.
+const STRAY_SHARE: f64 = 0.01;
 
-/// The unit of the readings: the one that is stated, but for degrees that are all within a turn in radians.
+/// The unit of the readings: the one that is stated, but for degrees that are within a turn in radians but for stray readings.
 pub(super) fn unit_of(postures: &[Posture], joints: &[String], options: &RecordingOptions) -> AngleUnit {
-    let is_small = |p: &Posture| turning(joints, options).all(|joint| p.positions[joint].abs() < SMALL_DEG);
+    let is_small = |p: &&Posture| turning(joints, options).all(|joint| p.positions[joint].abs() < SMALL_DEG);
+    let is_beyond = || (postures.iter().filter(|p| !is_small(p)).count() as f64) > STRAY_SHARE * postures.len() as f64;
     match options.joint_unit {
-        Some(AngleUnit::Deg) if !postures.iter().all(is_small) => AngleUnit::Deg,
+        Some(AngleUnit::Deg) if is_beyond() => AngleUnit::Deg,
         _ => AngleUnit::Rad,
     }
 }
@@ -35,7 +38,7 @@ fn turning(joints: &[String], options: &RecordingOptions) -> impl Iterator<Item 
     (0..joints.len()).filter(|joint| !options.prismatic.contains(&joints[*joint]))
 }
 
-/// What says that readings which count as radians are degrees: half of the joints are mostly more than a turn from zero, or turn faster than
+/// What says that readings which count as radians, and are not stated to be, are degrees: half of the joints are mostly more than a turn from zero, or turn faster than
 /// any does.
 pub(super) fn seem_degrees(
     recording: &Path,
@@ -43,6 +46,9 @@ pub(super) fn seem_degrees(
     joints: &[String],
     options: &RecordingOptions,
 ) -> Option<Notice> {
+    if options.joint_unit == Some(AngleUnit::Rad) {
+        return None;
+    }
     let all: Vec<usize> = turning(joints, options).collect();
     let is_far = |joint: &&usize| {
         2 * postures.iter().filter(|p| p.positions[**joint].abs() > SMALL_DEG).count() > postures.len()
@@ -111,6 +117,15 @@ mod tests {
         assert_eq!(unit(degrees, Some(AngleUnit::Deg)), AngleUnit::Deg);
         assert_eq!(unit(1.0, Some(AngleUnit::Deg)), AngleUnit::Rad);
         assert_eq!(unit(degrees, None), AngleUnit::Rad);
+        // Of a robot that waits near zero, a tenth of the readings tells; what is stated is not doubted.
+        let mut waiting = vec![Posture { time_ns: 0, positions: vec![0.0; 2], oldest_ns: 0 }; 5400];
+        waiting.extend(recorded(degrees));
+        assert_eq!(unit_of(&waiting, &joints, &stated(Some(AngleUnit::Deg))), AngleUnit::Deg);
+        let mut radians = recorded(1.0);
+        radians[300].positions[0] = 57.0;
+        assert_eq!(unit_of(&radians, &joints, &stated(Some(AngleUnit::Deg))), AngleUnit::Rad);
+        let in_rad = stated(Some(AngleUnit::Rad));
+        assert_eq!(seem_degrees(Path::new("run.mcap"), &recorded(degrees), &joints, &in_rad), None);
         let sliding = RecordingOptions { prismatic: vec!["b".to_owned()], ..RecordingOptions::default() };
         assert_eq!(factors(AngleUnit::Deg, &joints, &sliding), [1f64.to_radians(), 1.0]);
     }
