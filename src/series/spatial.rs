@@ -122,7 +122,10 @@ impl Lost {
         let gone: Vec<&str> = self.targets.iter().map(String::as_str).collect();
         let what = match gone[..] {
             [] => what,
-            _ => format!("{what}; nothing is left of {}, and no [[distance]] to it takes part", gone.join(", ")),
+            _ => format!(
+                "{what}; nothing is left of {} in this file, and a [[distance]] to it takes part only where another file has it",
+                gone.join(", ")
+            ),
         };
         Ok(Notice::new(Code::TargetLost, file.display(), what, "they are left out; measure again at these stops"))
     }
