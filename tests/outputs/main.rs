@@ -4,6 +4,8 @@
 
 #[path = "../outputs_support/mod.rs"]
 mod outputs_support;
+#[path = "../support/command.rs"]
+mod program;
 #[path = "../support/robots.rs"]
 mod robots;
 #[path = "../support/mod.rs"]

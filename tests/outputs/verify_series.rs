@@ -7,6 +7,7 @@ use std::process::Output;
 use assert_cmd::Command;
 use robotcal::Code;
 
+use crate::program::robotcal;
 use crate::robots::kr6_urdf;
 use crate::support::by_poses::with_poses;
 
@@ -69,12 +70,6 @@ fn poses_of_a_controller_judge_a_model_as_the_readings_do() {
         found.status.code()
     });
     assert_eq!(codes, [Some(2); 2]);
-}
-
-fn robotcal(args: &[&str]) -> Output {
-    let output = Command::cargo_bin("robotcal").unwrap().args(args).output().unwrap();
-    println!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    output
 }
 
 /// Exit code, the codes of what is said, and the error of the model, mm RMS.

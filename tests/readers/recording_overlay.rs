@@ -1,16 +1,11 @@
 //! A recording with the solution of its series, read without this program's own reader.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::recording_support::annotations;
-use crate::robots::kr6_urdf;
+use crate::robots::{kr6_urdf, repo};
 use serde_json::Value;
-
-fn shipped(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
 
 fn run(args: &[&str]) {
     let output = Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).output().unwrap();
@@ -33,7 +28,7 @@ fn camera_frames_and_residuals_of_the_solution_are_in_the_recording() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
     let urdf = kr6_urdf().display().to_string();
-    let series = shipped("datasets/kr6_small").display().to_string();
+    let series = repo("datasets/kr6_small").display().to_string();
     run(&["identify", "--urdf", &urdf, "--series", &series, "--robot-model", "rigid", "--out", &at("result")]);
     let solution = at("result/solution.json");
     run(&["convert", &series, &at("run.mcap"), "--urdf", &urdf, "--solution", &solution]);

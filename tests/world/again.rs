@@ -63,7 +63,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 #[test]
 fn one_thread_two_and_four_write_the_same_files() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let urdf = root.join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = kr6_urdf();
     let series = root.join("datasets/kr6_small");
     let written = |threads: &str| {
         let folder = tempfile::tempdir().unwrap();

@@ -505,7 +505,7 @@ fn images_that_cannot_be_decoded_are_left_out_of_a_recording_and_named() {
     let rows: Vec<&str> = joints.lines().take(1 + images.len()).collect();
     std::fs::write(series.join("joints.csv"), rows.join("\n") + "\n").unwrap();
     let whole = std::fs::read(series.join(&images[1])).unwrap();
-    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = root(KR6);
     let convert = |from: &Path, to: &str| {
         let to = folder.path().join(to);
         let output = robotcal(&["convert", from.to_str().unwrap(), to.to_str().unwrap(), "--urdf", &urdf]);
@@ -679,7 +679,7 @@ fn a_series_without_images_has_no_tilt_of_the_plate() {
 fn wide_lenses_without_noise_of_any_kind_are_no_lost_result() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let urdf = root("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+    let urdf = root(KR6);
     let made = |lens: &str, images: &str| {
         let common = ["simulate", "--urdf", &urdf, "--observations", "--field-deg", "75", "--seed", "4", "-q"];
         let output = robotcal(&[&common[..], &["--images", images, "--lens", lens, "--out", &path(lens)]].concat());
