@@ -106,7 +106,8 @@ impl From<circles::CircleDetection> for Detection {
         let edges = found.lopsided.filter(|l| l.exceeds(LOPSIDED_PX)).map(lopsided_notice);
         let spoilt = found.spoilt_edges().filter(|_| !found.found.is_empty());
         let spoilt = spoilt.map(|(what, remedy)| Notice::new(Code::MarkersUnmeasured, "image", what, remedy));
-        let notices = rings.into_iter().chain(edges).chain(spoilt).collect();
+        let smoothed = (found.smoothed > 0).then(|| smoothed_notice(found.smoothed, found.found.len()));
+        let notices = rings.into_iter().chain(edges).chain(spoilt).chain(smoothed).collect();
         let failure = found.failure().map(|(code, what, remedy)| {
             Error::new(code, "image", format!("{what}{}", found.dropped_summary()), remedy)
         });
@@ -131,6 +132,15 @@ impl From<circles::CircleDetection> for Detection {
             ..Self::default()
         }
     }
+}
+
+/// Clipped paper, strong compression, sharpening, motion.
+fn smoothed_notice(smoothed: usize, found: usize) -> Notice {
+    let what = format!(
+        "{smoothed} of {found} markers have clipped edges, or edges that no blur explains, and were measured in a smoothed copy of the image"
+    );
+    let remedy = "expose for less time, store images as PNG, switch off sharpening, and see that nothing moves";
+    Notice::new(Code::MarkersSmoothed, "image", what, remedy)
 }
 
 fn lopsided_notice(drift: Drift) -> Notice {

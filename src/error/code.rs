@@ -212,6 +212,7 @@ codes! {
         PlateLineHidden "plate_line_hidden" "a whole line of the plate is not seen where it should be",
         PlateNowhere "plate_nowhere" "no image can be used",
         MarkersUnmeasured "markers_unmeasured" "most identified markers of an image cannot be measured",
+        MarkersSmoothed "markers_smoothed" "markers of an image whose edges are clipped or spoilt were measured in a smoothed copy of it",
         BlurAsymmetric "blur_asymmetric" "edges are blurred more to one side: coma or motion",
     }
     Input "Recordings" {

@@ -99,6 +99,7 @@ fn is_information(code: Code) -> bool {
             | Code::ImageNotThere
             | Code::ImageTurned
             | Code::MarkersBright
+            | Code::MarkersSmoothed
             | Code::ImageUnlisted
             | Code::ImagesInMotion
             | Code::JointUnused

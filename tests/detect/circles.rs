@@ -5,6 +5,7 @@ use crate::grids::jpeg;
 use robotcal::Code;
 use robotcal::detect::Detection;
 use robotcal::detect::circles::{CircleDetection, DroppedCandidate, Found, Options, Outcome, Reason, detect};
+use robotcal::series::Edge;
 use robotcal::study::image_stage::{MirrorAnswer, Plates, identity_view};
 
 #[test]
@@ -48,6 +49,39 @@ fn overexposed_paper_costs_no_marker() {
         assert!(e.found as f64 >= 0.95 * e.visible as f64, "{times}: {} of {}", e.found, e.visible);
         assert!(e.nees() < 1.5 && e.rms() < 0.03, "{times}: nees {}, rms {} px", e.nees(), e.rms());
     }
+}
+
+/// More than a tenth of the markers are clipped, and one is covered at its edge: the clipped ones come back, and what covers one is no
+/// clipping, so that none comes back off its place.
+#[test]
+fn clipped_markers_come_back_and_a_covered_one_does_not() {
+    let scene = scene(&tilted());
+    let mut picture = scene.render(6);
+    let mut centres: Vec<_> = (0..scene.plate.markers.len())
+        .filter(|m| scene.visible(*m, 3.0))
+        .map(|m| scene.centroid(m, Edge::Outer).unwrap())
+        .collect();
+    centres.sort_by(|a, b| a.x.total_cmp(&b.x));
+    let begin = centres[centres.len() * 17 / 20].x;
+    let covered = centres[centres.len() / 3];
+    let size = centres.len();
+    for (k, v) in picture.pixels.iter_mut().enumerate() {
+        let (x, y) = ((k % picture.width) as f64, (k / picture.width) as f64);
+        let light = 1.0 + ((x - begin) / 40.0).clamp(0.0, 1.0);
+        // Something dark with a soft edge hangs over a side of the marker.
+        let cover = ((y - covered.y - 3.0) / 4.0).clamp(0.0, 1.0);
+        let is_beside = (x - covered.x).abs() < 9.0 && y - covered.y < 16.0;
+        let cover = if is_beside { 1.0 - 0.8 * cover } else { 1.0 };
+        *v = (f64::from(*v) * light * cover).round().min(255.0) as f32;
+    }
+    let found = detect(&picture, &scene.plate, &Options::default()).unwrap();
+    let e = errors(&scene, &found);
+    report(&scene, &found, &e);
+    let told = Detection::from(found.clone()).notices.iter().any(|n| n.code == Code::MarkersSmoothed);
+    assert_eq!((e.wrong, told), (0, found.smoothed > 0));
+    assert!(found.smoothed > size / 20 && e.found as f64 >= 0.9 * size as f64, "{} of {}", e.found, size);
+    let farthest = e.residuals.iter().map(|(off, ..)| off[0].hypot(off[1])).fold(0.0, f64::max);
+    assert!(farthest < 0.3, "{farthest} px");
 }
 
 /// Strong compression rings beside every edge and flattens the paper: the markers are found, and sigma covers what it did to them.

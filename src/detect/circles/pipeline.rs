@@ -52,12 +52,13 @@ pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Cir
     };
     let mut best = look(picture, 0.0)?;
     for sigma_px in SMOOTHINGS_PX {
-        if !best.is_clipped() && best.spoilt_edges().is_none() {
+        let reasons = best.spoilt_by();
+        if reasons.is_empty() {
             break;
         }
         let mut others = as_before(look(&smoothed(picture, sigma_px), sigma_px)?, sigma_px);
         allow_for_glare(&mut others, picture.full_scale, sigma_px);
-        best.complete(others);
+        best.complete(others, reasons);
     }
     Ok(best)
 }
@@ -450,6 +451,7 @@ impl Work<'_> {
             noise,
             inner_outer: harvest.inner_outer,
             lopsided,
+            smoothed: 0,
         }
     }
 }

@@ -246,12 +246,16 @@ pub struct CircleDetection {
     pub inner_outer: Option<InnerOuter>,
     /// By how much lopsided edges displace the centres; not taken off.
     pub lopsided: Option<Drift>,
+    /// Markers that were lost as they are, and measured in a smoothed copy of the picture.
+    pub smoothed: usize,
 }
 
 /// A marker that is as near as this to a lost one is the same, px.
 const SAME_PLACE_PX: f64 = 2.0;
 /// Share of the identified markers that is many.
 const MANY_CLIPPED: f64 = 0.1;
+/// Clipped edges, and those that are no blurred steps.
+const SPOILT: [Reason; 3] = [Reason::Saturated, Reason::EdgeModel, Reason::NoConvergence];
 
 impl CircleDetection {
     /// Number of dropped candidates for every reason.
@@ -276,15 +280,23 @@ impl CircleDetection {
         Some((Code::MarkersUnmeasured, what, remedy))
     }
 
-    /// Many markers are lost for no other reason than that their paper is at full scale.
-    pub(super) fn is_clipped(&self) -> bool {
+    /// For which reasons so many markers are lost that they are looked for in a smoothed copy of the picture: what hides single ones
+    /// among them is no reason.
+    pub(super) fn spoilt_by(&self) -> &'static [Reason] {
         let clipped = self.dropped.iter().filter(|d| d.marker.is_some() && d.reason == Reason::Saturated).count();
-        clipped > 0 && clipped as f64 >= MANY_CLIPPED * (clipped + self.found.len()) as f64
+        let many = clipped > 0 && clipped as f64 >= MANY_CLIPPED * (clipped + self.found.len()) as f64;
+        match self.spoilt_edges() {
+            Some(_) => &SPOILT,
+            None if many => &SPOILT[..1],
+            None => &[],
+        }
     }
 
-    /// Takes the markers that were identified and lost from what was found at their places in a smoothed copy of the picture.
-    pub(super) fn complete(&mut self, smoothed: Self) {
-        let lost: BTreeMap<u32, [f64; 2]> = self.dropped.iter().filter_map(|d| Some((d.marker?, d.uv))).collect();
+    /// Takes the markers that were identified and lost for these reasons from what was found at their places in a smoothed copy of the
+    /// picture.
+    pub(super) fn complete(&mut self, smoothed: Self, reasons: &[Reason]) {
+        let lost = self.dropped.iter().filter(|d| reasons.contains(&d.reason));
+        let lost: BTreeMap<u32, [f64; 2]> = lost.filter_map(|d| Some((d.marker?, d.uv))).collect();
         let is_lost = |f: &Found| {
             let centre = f.measured.outer.ellipse.centre;
             lost.get(&f.marker).is_some_and(|uv| (uv[0] - centre[0]).hypot(uv[1] - centre[1]) < SAME_PLACE_PX)
@@ -292,9 +304,11 @@ impl CircleDetection {
         if self.found.is_empty() {
             (self.blur_px, self.noise) = (smoothed.blur_px, smoothed.noise);
         }
+        let before = self.found.len();
         self.found.extend(smoothed.found.into_iter().filter(is_lost));
         self.found.sort_by_key(|f| f.marker);
         self.found.dedup_by_key(|f| f.marker);
+        self.smoothed += self.found.len() - before;
         let found: BTreeSet<u32> = self.found.iter().map(|f| f.marker).collect();
         self.dropped.retain(|d| d.marker.is_none_or(|marker| !found.contains(&marker)));
         self.observations = self.found.iter().flat_map(Found::observations).collect();
