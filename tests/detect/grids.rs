@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use robotcal::Code;
 use robotcal::detect::{Detection, Picture, detect, detect_series};
-use robotcal::series::{Plate, parse_plate};
+use robotcal::series::{Edge, Plate, parse_plate};
 use robotcal::simulate::conditions::Glare;
 
 use crate::circles_support::{Scene, View, pose, scene};
@@ -109,10 +109,10 @@ impl Tally {
     fn add(&mut self, scene: &Scene, detection: &Detection, turned: &impl Fn(u32) -> u32) {
         self.dots += scene.plate.markers.len();
         let off = |id: u32, uv: [f64; 2]| {
-            let truth = scene.centroid(scene.plate.index_of(id).unwrap(), robotcal::series::Edge::Outer).unwrap();
+            let truth = scene.centroid(scene.plate.index_of(id).unwrap(), Edge::Outer).unwrap();
             [uv[0] - truth.x, uv[1] - truth.y]
         };
-        let outer: Vec<_> = detection.observations.iter().filter(|o| o.edge == robotcal::series::Edge::Outer).collect();
+        let outer: Vec<_> = detection.observations.iter().filter(|o| o.edge == Edge::Outer).collect();
         let far = |id: u32, uv: [f64; 2]| {
             let d = off(id, uv);
             d[0].hypot(d[1]) > 2.0
@@ -252,6 +252,50 @@ fn the_edge_of_a_shadow_turns_no_grid_of_equal_dots() {
         }
         tally.report(keys);
         assert!(seen >= 3 && tally.wrong == 0 && tally.found > 0, "{keys}: {seen} {tally:?}");
+    }
+}
+
+/// The grid upside down, lit so that the light halves over the picture from left to right.
+fn upside_down(stated: &Plate, large: &[u32]) -> (Scene, Picture) {
+    let view = View { distance_m: 0.36, tilt_deg: 10.0, azimuth_deg: 50.0, roll_deg: 172.0, ..View::default() };
+    let scene = Scene { plate: printed(stated, large, &[]), camera_from_plate: pose(&view), ..scene(&view) };
+    let lit = scene.render(1);
+    let columns = || (0..scene.plate.markers.len()).filter_map(|m| Some(scene.centroid(m, Edge::Outer)?.x));
+    let (from, to) = (columns().fold(f64::INFINITY, f64::min), columns().fold(f64::NEG_INFINITY, f64::max));
+    let shade = |(k, v): (usize, &f32)| {
+        let share = (((k % lit.width) as f64 - from) / (to - from)).clamp(0.0, 1.0);
+        (f64::from(*v) * (1.0 - 0.5 * share)).round() as f32
+    };
+    let picture = Picture { pixels: lit.pixels.iter().enumerate().map(shade).collect(), ..lit.clone() };
+    (scene, picture)
+}
+
+/// Light that changes evenly is no edge of a shadow: the larger dots, which stand where it is weakest, turn the grid.
+#[test]
+fn larger_dots_turn_a_grid_on_which_the_light_falls_off() {
+    for large in [&[0][..], &[12, 13]] {
+        let stated = grid("columns = 11\nrows = 8");
+        let (scene, picture) = upside_down(&stated, large);
+        let detection = detect(&picture, &stated).unwrap();
+        let mut tally = Tally::default();
+        tally.add(&scene, &detection, &|id| id);
+        assert_eq!((tally.found, tally.wrong), (tally.dots, 0), "{large:?}");
+        assert_eq!(detection.circles.as_ref().unwrap().sizes.large, large);
+        assert!(!detection.notices.iter().any(|n| n.code == Code::PlateSymmetric), "{:?}", detection.notices);
+    }
+}
+
+/// The radius of all dots is stated, and two are larger: they are not passed over.
+#[test]
+fn larger_dots_that_are_not_stated_are_named() {
+    let stated = grid("columns = 11\nrows = 8\nradius_m = 0.0048");
+    for (large, codes) in
+        [(&[12, 13][..], vec![Code::PlateSymmetric, Code::PlateContradicted]), (&[], vec![Code::PlateSymmetric])]
+    {
+        let detection = detect(&upside_down(&stated, large).1, &stated).unwrap();
+        assert_eq!(detection.observations.len(), 88);
+        let of_turn = |code: &Code| [Code::PlateSymmetric, Code::PlateContradicted].contains(code);
+        assert_eq!(detection.notices.iter().map(|n| n.code).filter(of_turn).collect::<Vec<_>>(), codes);
     }
 }
 

@@ -68,6 +68,7 @@ pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Resul
     }
     if facts.symmetric {
         detection.notices.push(symmetric_notice());
+        detection.notices.extend((!facts.unstated.is_empty()).then(|| unstated_notice(&facts.unstated)));
     }
     Ok(detection)
 }
@@ -99,6 +100,8 @@ fn spoilt(found: &CircleDetection) -> bool {
 struct Facts {
     /// It looks the same after a turn.
     symmetric: bool,
+    /// Rows and columns of larger dots of a plate whose radii are stated and equal, where they tell how it is turned.
+    unstated: Vec<(i32, i32)>,
     sizes: Sizes,
     /// Columns and rows of dots, where all ends are in view.
     size: Option<[u32; 2]>,
@@ -238,6 +241,10 @@ impl<'a> Grid<'a> {
         };
         facts.sizes = if outline_tells { Sizes { large: Vec::new(), ..sizes } } else { sizes };
         facts.symmetric = laid.len() > 1;
+        if let Some(larger) = Some(told).filter(|t| *t == Told::Equal).and_then(|_| Dots::larger(lattice, candidates)) {
+            let here = others(chosen, &larger);
+            facts.unstated = if laid.iter().all(|l| others(l, &larger) == here) { Vec::new() } else { here };
+        }
         facts.outer = self.outer(&view, chosen);
         Ok((self.identified(plate, board, outcome)?, facts))
     }
@@ -406,14 +413,18 @@ fn no_lattice() -> Error {
     )
 }
 
+/// Rows and columns as plate.toml has them.
+fn written(seen: &[(i32, i32)]) -> String {
+    seen.iter().map(|(row, column)| format!("[{column}, {row}]")).collect::<Vec<_>>().join(", ")
+}
+
 fn dots_elsewhere(seen: &[(i32, i32)]) -> Error {
-    let places: Vec<String> = seen.iter().map(|(row, column)| format!("[{column}, {row}]")).collect();
     Error::new(
         Code::PlateContradicted,
         "image",
         format!(
             "the dots of another size stand at [column, row] = {} or the same after a turn, not as stated",
-            places.join(", ")
+            written(seen)
         ),
         "correct columns, rows and large (or plate.csv) of the plate file: both count from 0 at the top-left dot",
     )
@@ -426,6 +437,16 @@ fn cut_grid() -> Error {
         "the dots reach the border of the image, or what covers them: neither their number nor their place on the plate can be told",
         "take the image so that all dots are in view with paper around them, and check columns and rows of the plate file",
     )
+}
+
+fn unstated_notice(seen: &[(i32, i32)]) -> Notice {
+    let places = written(seen);
+    let what = format!(
+        "larger dots are seen at [column, row] = {places} or the same after a turn, though the stated radii are equal: they turn nothing"
+    );
+    let remedy =
+        format!("write large = [{places}] into the plate file, or the same after a turn, if they are printed so");
+    Notice::new(Code::PlateContradicted, "image", what, remedy)
 }
 
 fn symmetric_notice() -> Notice {

@@ -34,6 +34,15 @@ pub(super) struct Dots {
 }
 
 impl Dots {
+    /// Dots that are larger than most by as much as is printed, where the light does not make them so.
+    pub fn larger(lattice: &Lattice, candidates: &[Candidate]) -> Option<Self> {
+        let mut dots = Self::of(lattice, candidates)?;
+        dots.leave_out_uneven_light(lattice, candidates);
+        let usual = dots.usual.radius;
+        dots.other.retain(|_, dot| (dot.radius / usual).ln() > MISSING);
+        Some(dots)
+    }
+
     /// Sorts the dots of a lattice; `None` where no kind makes up most of them.
     pub fn of(lattice: &Lattice, candidates: &[Candidate]) -> Option<Self> {
         let dot = |(cell, site): (&Cell, &super::lattice::Site)| {
@@ -63,16 +72,13 @@ impl Dots {
         Some(Self { usual: Dot { radius, ratio }, other: BTreeMap::new() })
     }
 
-    /// Dots that look larger or smaller beside a change of the light count as usual: the edge of a shadow moves edges, and makes no ring.
+    /// Dots that look larger or smaller beside a step of the light count as usual: the edge of a shadow moves edges, and makes no ring.
+    /// Light that changes by the same from dot to dot moves none.
     pub fn leave_out_uneven_light(&mut self, lattice: &Lattice, candidates: &[Candidate]) {
-        let paper = |cell: &Cell| lattice.cells.get(cell).map(|site| f64::from(candidates[site.candidate].paper));
-        let around = |(i, j): Cell| (i - 1..=i + 1).flat_map(move |i| (j - 1..=j + 1).map(move |j| (i, j)));
-        let is_even = |cell: &Cell| {
-            let papers = || around(*cell).filter_map(|other| paper(&other));
-            (papers().fold(0.0, f64::max) / papers().fold(f64::INFINITY, f64::min)).ln() < EVEN_LIGHT
-        };
+        let paper =
+            |cell: Cell| lattice.cells.get(&cell).map(|site| f64::from(candidates[site.candidate].paper).max(1.0).ln());
         let usual = self.usual.ratio > 0.0;
-        self.other.retain(|cell, dot| (dot.ratio > 0.0) != usual || is_even(cell));
+        self.other.retain(|cell, dot| (dot.ratio > 0.0) != usual || is_even(*cell, &paper));
     }
 
     /// Adds dots that are not on the lattice where they are not as most are.
@@ -80,6 +86,29 @@ impl Dots {
         let usual = self.usual.radius;
         self.other.extend(dots.into_iter().filter(|(_, d)| (d.radius / usual).ln().abs() > MISSING));
     }
+}
+
+/// Whether the paper, as a logarithm, has no step around a dot: it differs little, or goes on with the same slope on both sides of the dot
+/// or beyond it.
+fn is_even((i, j): Cell, paper: &impl Fn(Cell) -> Option<f64>) -> bool {
+    let at = |(di, dj): Cell, steps: i32| paper((i + steps * di, j + steps * dj));
+    let around: Vec<Cell> = (-1..=1).flat_map(|di| (-1..=1).map(move |dj| (di, dj))).filter(|d| *d != (0, 0)).collect();
+    let all = || around.iter().filter_map(|d| at(*d, 1)).chain(paper((i, j)));
+    if all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min) < EVEN_LIGHT {
+        return true;
+    }
+    // Of a dot without a contour: what those around say.
+    let pair = |d: &Cell| Some(0.5 * (at(*d, 1)? + at(*d, -1)?));
+    let beyond = |d: &Cell| Some(2.0 * at(*d, 1)? - at(*d, 2)?);
+    let of_others = || median(around.iter().filter_map(pair)).or_else(|| median(around.iter().filter_map(beyond)));
+    let Some(own) = paper((i, j)).or_else(of_others) else { return false };
+    let goes_on = |d: &Cell| {
+        let Some(beside) = at(*d, 1) else { return true };
+        let bends = [at(*d, -1).map(|other| other + beside - 2.0 * own), at(*d, 2).map(|far| far + own - 2.0 * beside)];
+        let is_told = bends.iter().any(Option::is_some) || (beside - own).abs() < EVEN_LIGHT;
+        is_told && bends.iter().flatten().all(|bend| bend.abs() < EVEN_LIGHT)
+    };
+    around.iter().all(goes_on)
 }
 
 /// Least and largest of the values that no gap parts from their median.
@@ -100,6 +129,40 @@ fn around_the_median(mut values: Vec<f64>) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Light that halves over seven dots is even everywhere, at the border and where a dot is missing; the edge of a shadow is not,
+    /// wherever it lies between the dots or across one.
+    #[test]
+    fn a_slope_of_the_light_is_even_and_a_step_is_not() {
+        let inside = |(i, j): Cell, missing: Cell| (0..8).contains(&i) && (0..6).contains(&j) && (i, j) != missing;
+        let slope = |(i, j): Cell| f64::from(2 * i + j) * 0.5 * 0.5_f64.ln() / 7.0;
+        for cell in (0..8).flat_map(|i| (0..6).map(move |j| (i, j))) {
+            for steep in [1.0, 2.0] {
+                let paper = |missing: Cell| move |c: Cell| inside(c, missing).then(|| steep * slope(c));
+                assert!(is_even(cell, &paper((-9, -9))) && is_even(cell, &paper(cell)), "{cell:?}");
+            }
+            for own in [0.0, -0.3, -0.52, -0.8, -1.05] {
+                let shadow = |c: Cell| {
+                    let depth = if c.0 > cell.0 {
+                        -1.05
+                    } else if c.0 == cell.0 {
+                        own
+                    } else {
+                        0.0
+                    };
+                    inside(c, (-9, -9)).then_some(depth)
+                };
+                let has_step = if cell.0 == 7 {
+                    own != 0.0
+                } else if cell.0 == 0 {
+                    own != -1.05
+                } else {
+                    true
+                };
+                assert_eq!(is_even(cell, &shadow), !has_step, "{cell:?} {own}");
+            }
+        }
+    }
 
     #[test]
     fn a_gap_parts_the_large_and_a_slow_drift_does_not() {

@@ -28,11 +28,14 @@ pub(super) fn missing_dots(
     let placed =
         |(cell, site): (&Cell, &super::lattice::Site)| (*cell, Placed { candidate: site.candidate, class: None });
     let board: Board = lattice.cells.iter().map(placed).collect();
-    let level =
-        |pick: fn(&Candidate) -> f32| median(lattice.cells.values().map(|s| f64::from(pick(&candidates[s.candidate]))));
-    let (Some(paper), Some(ink)) = (level(|c| c.paper), level(|c| c.ink)) else { return Vec::new() };
-    let threshold = 0.5 * (paper + ink);
+    // Light may change over the board: the dots around tell it.
+    let level = |cell: Cell, pick: fn(&Candidate) -> f32| {
+        let is_near = |c: &Cell| (c.0 - cell.0).abs().max((c.1 - cell.1).abs()) <= 1;
+        let near = lattice.cells.iter().filter(|(c, _)| is_near(c));
+        median(near.map(|(_, site)| f64::from(pick(&candidates[site.candidate]))))
+    };
     let dot = |cell: Cell| {
+        let threshold = 0.5 * (level(cell, |c| c.paper)? + level(cell, |c| c.ink)?);
         let usual_image = neighbourhood(&board, cell, candidates)?.0.ellipse(usual.radius)?;
         let along = |k: usize| {
             let angle = k as f64 * std::f64::consts::TAU / RAYS as f64;
