@@ -54,6 +54,9 @@ fn what_a_routine_sets_for_a_while_may_hold_where_an_interrupt_leaves_it() {
         (format!("{INTERRUPT}search()\nMOVE\n{search}\nEND\nDEF h()\nBRAKE"), 3, vec![]),
         (format!("search()\nMOVE\n{search}\n{handler}"), 3, vec![]),
         (format!("{INTERRUPT}search()\nMOVE\nEND\nDEF search()\nMOVE\n{handler}"), 2, vec![]),
+        // It may have been left before it has set anything.
+        (format!("{INTERRUPT}search()\nMOVE\nEND\nDEF search()\nMOVE\nSET\n{handler}"), 1, vec![tool]),
+        (format!("{INTERRUPT}search()\nMOVE\nEND\nDEF search()\nMOVE\nSET\nEND\nDEF h()\nBRAKE"), 2, vec![]),
     ] {
         let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
         assert_eq!(told(&cell, &[("a.src", krl_text(&pose, &body))], &[]), (corrected, left), "{body}");

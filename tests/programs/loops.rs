@@ -120,6 +120,8 @@ fn what_a_thread_sets_may_hold_until_it_has_ended() {
         (format!("{sets}  k=run t()\n{own}  sleep(1)\n{first}{second}"), 2),
         (format!("{sets}  k=run t()\n{own}  sync()\n{first}{own}{second}"), 1),
         (format!("{sets}  k=run t()\n  join k\n{own}{first}{second}"), 0),
+        (format!("{sets}  k=run t()\n{own}  join k\n{first}{second}"), 2),
+        (format!("{sets}  k=run t()\n{own}  kill k\n{first}{second}"), 0),
         (format!("{sets}  k=run t()\n  kill k\n{own}{first}{second}"), 0),
         (format!("{sets}  k=run t()\n  join l\n{own}{first}{second}"), 1),
         (format!("{sets}  k=run t()\n  k=run t()\n  join k\n{own}{first}{second}"), 1),

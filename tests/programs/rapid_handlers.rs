@@ -37,6 +37,24 @@ fn what_a_handler_switches_holds_where_its_routine_goes_on() {
             1,
             vec![],
         ),
+        // It may fail before it has switched anything.
+        (
+            format!("{SHIFT}\nUnshift;\n{STEP}\nERROR\nTRYNEXT;\nENDPROC\nPROC Unshift()\nSearchIt;\nPDispOff;"),
+            0,
+            vec![frame],
+        ),
+        (format!("{SHIFT}\nUnshift;\n{STEP}\nENDPROC\nPROC Unshift()\nSearchIt;\nPDispOff;"), 1, vec![]),
+        // The statement that failed is the last one of a branch or a loop, or the last one before it.
+        (format!("WHILE a DO\n{STEP}\nENDWHILE\nERROR\n{SHIFT}\nTRYNEXT;"), 0, vec![frame]),
+        (format!("FOR i FROM 1 TO 3 DO\n{STEP}\nENDFOR\nERROR\n{SHIFT}\nTRYNEXT;"), 0, vec![frame]),
+        (format!("IF a THEN\n{STEP}\nELSE\nPDispOff;\nENDIF\n{STEP}\nERROR\n{SHIFT}\nTRYNEXT;"), 1, vec![frame]),
+        (format!("IF a THEN\n{STEP}\nENDIF\nPDispOff;\n{STEP}\nERROR\n{SHIFT}\nTRYNEXT;"), 2, vec![]),
+        (
+            format!("TEST a\nCASE 1:\n{STEP}\nDEFAULT:\nPDispOff;\nENDTEST\n{STEP}\nERROR\n{SHIFT}\nTRYNEXT;"),
+            1,
+            vec![frame],
+        ),
+        (format!("SearchIt;\nIF a THEN\nPDispOff;\nELSE\n{STEP}\nENDIF\nERROR\n{SHIFT}\nTRYNEXT;"), 0, vec![frame]),
         // The program stops, or its caller goes on.
         (format!("{STEP}\n{STEP}\nERROR\n{SHIFT}\nEXIT;"), 2, vec![]),
         (caller(&format!("{SHIFT}\nRETURN;")), 0, vec![frame, frame]),

@@ -46,13 +46,14 @@ impl Module<'_> {
         (active, stands)
     }
 
-    /// Behind a call of a routine: an interrupt may have left it at any of its statements (`RESUME`).
-    pub(super) fn may_have_been_left(&mut self, routine: &str) {
+    /// Behind a call of a routine, begun with `before`: an interrupt may have left it at any of its statements (`RESUME`).
+    pub(super) fn may_have_been_left(&mut self, routine: &str, before: &Now) {
         let is_beside = self.now.0.beside.value.iter().any(|name| !SET.contains(&name.as_str()));
         if !self.resumes || !is_beside {
             return;
         }
         if let Some((end, _)) = self.flow.behind(routine, &unset()) {
+            self.now.0 = self.now.0.merged(&before.0, LEFT_ANYWHERE);
             self.now.0.or_left_by(&end, LEFT_ANYWHERE);
         }
         self.way.go_beyond(&mut self.now.1);

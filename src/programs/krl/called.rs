@@ -52,8 +52,9 @@ impl Module<'_> {
             if is_called && is_beside {
                 self.begins_beside(name);
             } else if is_called && self.flow.has_routine(&name) {
+                let before = self.now.clone();
                 self.way.call(name.clone(), &mut self.flow, &mut self.now);
-                self.may_have_been_left(&name);
+                self.may_have_been_left(&name, &before);
             } else if is_called && !is_motion {
                 self.calls_unknown(reader, name, at + 1);
             } else if is_given && self.assigned.changes(&name) {

@@ -17,6 +17,10 @@ const TRY_NEXT: &str = "TRYNEXT";
 /// Instructions that do not fail.
 const SURE: [&str; 7] = ["CONFJ", "CONFL", "EOFFSOFF", "EOFFSSET", "PDISPOFF", "PDISPSET", "SINGAREA"];
 
+/// Words between statements, at which branches and loops begin and end.
+const BRANCHES: [&str; 12] =
+    ["IF", "TEST", "WHILE", "FOR", "ELSE", "ELSEIF", "CASE", "DEFAULT", "ENDIF", "ENDTEST", "ENDWHILE", "ENDFOR"];
+
 /// The trap routine in `CONNECT .. WITH NAME`, on whose first word the reader stands.
 fn connected(reader: &Reader<'_>) -> Option<String> {
     if !reader.ahead_is_word(0, "CONNECT") {
@@ -147,6 +151,9 @@ impl Switching {
             all.extend(self.flow.meant(&trap));
             self.now.0.beside.set(all);
         }
+        if BRANCHES.contains(&word) {
+            self.next_begins();
+        }
         match word {
             w if ROUTINES.contains(&w) => {
                 way.start_afresh();
@@ -231,6 +238,12 @@ impl Switching {
         self.top.note(&self.now.0);
     }
 
+    /// What is behind the last statement begins, in the text or where a branch or a loop ends.
+    fn next_begins(&mut self) {
+        self.goes_on_behind_failure();
+        self.may_have_failed = false;
+    }
+
     fn goes_on_behind_failure(&mut self) {
         if self.may_have_failed {
             self.goes_on_from(TRY_NEXT);
@@ -256,6 +269,7 @@ impl Switching {
 
     /// Behind a statement with branches, or a loop.
     pub fn branches_end(&mut self, way: &mut Itinerary) {
+        self.next_begins();
         way.branches_end();
         self.flow.end(&mut self.now);
     }
@@ -280,21 +294,24 @@ impl Switching {
             "PDISPOFF" => self.now.0.displaced.set(false),
             "EOFFSOFF" => self.now.0.offset.set(false),
             _ => {
-                self.may_have_failed_within(word, RETRY);
+                let before = self.now.clone();
+                self.may_have_failed_within(word, RETRY, &before);
                 way.call(word.to_owned(), &mut self.flow, &mut self.now);
-                self.may_have_failed_within(word, TRY_NEXT);
+                self.may_have_failed_within(word, TRY_NEXT, &before);
             }
         }
     }
 
-    /// A routine that a statement calls, and that fails, hands its error on to the handler of this one, which goes on so.
-    fn may_have_failed_within(&mut self, routine: &str, end: &str) {
+    /// A routine that a statement calls, and that fails, hands its error on to the handler of this one, which goes on so: with what held
+    /// before the call, or with anything that the routine has switched.
+    fn may_have_failed_within(&mut self, routine: &str, end: &str, before: &Now) {
         if self.handler.is_some() || !self.flow.has_routine(routine) || self.flow.behind_part(end, &self.now).is_none()
         {
             return;
         }
         let nothing = (Switched::new([Watched::On; 2], [false; 3]), Stands::default());
         if let Some((left, _)) = self.flow.behind(routine, &nothing) {
+            self.now.0 = self.now.0.merged(&before.0, "");
             self.now.0.or_left_by(&left);
         }
     }

@@ -49,6 +49,9 @@ impl Script<'_> {
         if !ENDS.contains(&word) || next != Some(TokenKind::Word) {
             return false;
         }
+        if word == b"join" {
+            self.time_passes();
+        }
         let variable = called(&self.reader, 1);
         let mut all = self.now.0.beside.value.clone();
         all.retain(|_, held| held.is_none() || *held != variable);
