@@ -105,6 +105,9 @@ fn malformed_modules_are_refused_with_their_line() {
             Code::ProgramQuaternion,
             [":1", "1.4142"],
         ),
+        // What is written in numbers beside computed parts.
+        ("VAR robtarget p:=[[1,2,3],[0,2,0,0],[0,0,0,0],q.extax];\n", Code::ProgramQuaternion, [":1", "2.0000"]),
+        ("VAR robtarget p:=[[1,2],[1,0,0,0],q.robconf,q.extax];\n", Code::ProgramTargets, [":1", "[3, 4, 4, 6]"]),
         ("CONST robtarget p:=[[1,2,3],[1,0,0,0];\n", Code::ProgramSyntax, [":1", "["]),
         ("MODULE m\nPROC p()\nMoveL p10,v100,z1,tool0\n", Code::ProgramSyntax, [":3", "MoveL"]),
     ] {

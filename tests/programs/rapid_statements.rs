@@ -354,6 +354,10 @@ fn a_target_made_of_parts_of_others_is_computed() {
     for target in ["[p1.trans,p1.rot,p1.robconf,p1.extax]", "[[300,0,400],p1.rot,p1.robconf,p1.extax]"] {
         assert_told(&cell, &go(target), 1, &[computed]);
     }
+    // The external axes alone may move what the arm stands on.
+    assert_told(&cell, &go("[[300,0,400],[0,0,1,0],[0,0,0,0],p1.extax]"), 1, &[computed]);
     let none = "9E9,9E9,9E9,9E9,9E9,9E9";
-    assert_told(&cell, &format!("MoveAbsJ #,v1,z1,tGun;\nMoveAbsJ [jHere.robax,[{none}]],v1,z1,tGun;"), 1, &[computed]);
+    for target in [format!("[jHere.robax,[{none}]]"), "[[1,2,3,4,5,6],jHere.extax]".to_owned()] {
+        assert_told(&cell, &format!("MoveAbsJ #,v1,z1,tGun;\nMoveAbsJ {target},v1,z1,tGun;"), 1, &[computed]);
+    }
 }

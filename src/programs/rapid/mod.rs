@@ -357,14 +357,14 @@ impl Task<'_> {
         let Node::List(parts) = value else {
             return Err(Why::new(LeftReason::NotATarget, "it is no robtarget and no jointtarget"));
         };
-        let external = parts.last().and_then(numbers::<6>).unwrap_or_default();
+        let external = self.external(parts);
         if is_of_external_axes(value) {
             let words = "it moves external axes alone: the arm stays where it is";
             return Err(Why::new(LeftReason::NotATarget, words));
         }
         if parts.len() == 2 {
             let frames = Box::new(self.beside_joints(tool, work));
-            return Ok(TargetKind::Joints(JointTarget { frames, ..self.joints(&parts[0], &external, file)? }));
+            return Ok(TargetKind::Joints(JointTarget { frames, ..self.joints(&parts[0], &external?, file)? }));
         }
         if *self.switching.now().displaced.value() {
             let words = "a program displacement (PDispOn, PDispSet) may be active";
@@ -374,10 +374,10 @@ impl Task<'_> {
             let words = "a sensor or the program moves the tool off it (\\Corr, \\Track)";
             return Err(Why::new(LeftReason::FrameUnknown, words));
         }
-        let computed = || Why::new(LeftReason::Computed, "it is computed, not written in numbers");
-        let trans = numbers::<3>(&parts[0]).ok_or_else(computed)?;
-        let [w, x, y, z] = numbers::<4>(&parts[1]).ok_or_else(computed)?;
-        let cf = numbers::<4>(&parts[2]).ok_or_else(computed)?;
+        let trans = numbers::<3>(&parts[0]).ok_or_else(Why::computed)?;
+        let [w, x, y, z] = numbers::<4>(&parts[1]).ok_or_else(Why::computed)?;
+        let cf = numbers::<4>(&parts[2]).ok_or_else(Why::computed)?;
+        let external = external?;
         let field = |(written, range): (f64, Range<usize>), si: f64, decimals: usize| Field {
             file,
             place: FieldPlace::At(range),
@@ -416,6 +416,15 @@ impl Task<'_> {
             displaced: None,
             joint_fields: vec![None; axes.len()],
         })))
+    }
+
+    /// External axes of a target; where they are computed, none where they move nothing.
+    fn external(&self, parts: &[Node]) -> Understood<[(f64, Range<usize>); 6]> {
+        let matters = self.setting.axes.len() > 6 || !self.setting.axes_apart;
+        match parts.last().and_then(numbers::<6>) {
+            None if matters => Err(Why::computed()),
+            numbers => Ok(numbers.unwrap_or_default()),
+        }
     }
 
     /// SI value and decimals of a reading's unit.

@@ -200,13 +200,11 @@ pub(super) fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result
         _ => return Ok(()),
     };
     let Node::List(parts) = value else { return Ok(()) };
-    // `[p.trans, p.rot, ..]` is computed.
-    if parts.len() == shape.len() && parts.iter().any(|part| !matches!(part, Node::List(_))) {
-        return Ok(());
-    }
     let count = |n: &Node| if let Node::List(l) = n { l.len() } else { 0 };
-    let found: Vec<usize> = parts.iter().map(count).collect();
-    if found != shape {
+    // `[p.trans, p.rot, ..]` is computed.
+    let fits = |(part, wanted): (&Node, &usize)| !matches!(part, Node::List(_)) || count(part) == *wanted;
+    if parts.len() != shape.len() || !parts.iter().zip(shape).all(fits) {
+        let found: Vec<usize> = parts.iter().map(count).collect();
         let what = format!("{name} has {found:?} numbers in its brackets, a {} has {shape:?}", kind.to_lowercase());
         return Err(Error::new(Code::ProgramTargets, place, what, "complete it"));
     }
