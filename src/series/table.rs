@@ -96,8 +96,30 @@ impl Table {
         }
         match table.headers.is_empty() {
             true => Err(Error::new(Code::FileEmpty, table.file, "is empty", "its first line names the columns")),
-            false => Ok(table),
+            false => table.without_index(),
         }
+    }
+
+    /// Without the column of row numbers that pandas writes before the others, without a name.
+    fn without_index(mut self) -> Result<Self> {
+        if !self.headers[0].is_empty() {
+            return Ok(self);
+        }
+        let is_index = self.rows().enumerate().all(|(k, row)| row.cell(0) == k.to_string());
+        if !is_index || self.headers.len() == 1 {
+            return Err(self.without_name(0));
+        }
+        let mut cells = Cells::default();
+        self.rows().for_each(|row| (1..self.headers.len()).for_each(|column| cells.push(row.cell(column))));
+        self.cells = cells;
+        self.headers.remove(0);
+        Ok(self)
+    }
+
+    /// Complaint about a column.
+    fn without_name(&self, column: usize) -> Error {
+        let what = format!("column {} has no name", column + 1);
+        Error::new(Code::CsvColumnUnknown, self.place_of_header(), what, "name it or remove the extra comma")
     }
 
     /// The next row; the first is the header.
@@ -134,14 +156,9 @@ impl Table {
         let mut seen = BTreeSet::new();
         for (i, name) in self.headers.iter().enumerate() {
             plain_name("column", name, self.place_of_header())?;
-            if name.is_empty() {
-                let what = format!("column {} has no name", i + 1);
-                return Err(Error::new(
-                    Code::CsvColumnUnknown,
-                    self.place_of_header(),
-                    what,
-                    "name it or remove the extra comma",
-                ));
+            // The first one may be of row numbers.
+            if name.is_empty() && i > 0 {
+                return Err(self.without_name(i));
             }
             if !seen.insert(name) {
                 let what = format!("two columns are named \"{name}\"");

@@ -267,6 +267,8 @@ fn a_table_of_joint_vectors_is_read_as_every_other_table() {
         (format!("{names}\n# taught by hand\n{row}\n"), Code::CsvSyntax, 2),
         (format!("{names}\n{row},30\n"), Code::CsvCellCount, 2),
         (format!("{names}\n"), Code::FileEmpty, 1),
+        (format!(",{names}\n7,{row}\n"), Code::CsvColumnUnknown, 1),
+        (format!("{names},\n{row},0\n"), Code::CsvColumnUnknown, 1),
     ] {
         std::fs::write(&at, table).unwrap();
         let place = format!("{}:{line}", at.display());
@@ -275,6 +277,15 @@ fn a_table_of_joint_vectors_is_read_as_every_other_table() {
         assert_eq!(output.status.code(), Some(2), "{}", text(&output));
         assert_says(&text(&output), code, &[&place]);
     }
+    // Row numbers, as pandas writes them, are no joint.
+    let said = [format!("{names}\n{row}\n{row}\n"), format!(",{names}\n0,{row}\n1,{row}\n")].map(|table| {
+        std::fs::write(&at, table).unwrap();
+        let args = ["show", &root("reports/kr6_small/solution.json"), "--at", at.to_str().unwrap(), "--at-unit", "deg"];
+        let output = robotcal(&args);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+        output.stdout
+    });
+    assert_eq!(said[0], said[1]);
 }
 
 #[test]
