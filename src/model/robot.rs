@@ -206,13 +206,6 @@ impl Robot {
         Self { terms, ..Self::nominal(chain) }
     }
 
-    /// This robot under a controller whose zero points have been corrected, and these corrections (added to every reading), rad or m: no
-    /// offset is left.
-    pub fn mastered(&self) -> (Self, Vec<f64>) {
-        let shifts = self.zero_corrections();
-        (self.mastered_by(&shifts), shifts)
-    }
-
     /// What a controller has to add to every reading so that no offset is left, rad or m.
     pub fn zero_corrections(&self) -> Vec<f64> {
         // q + offset + gear q = (q + shift)(1 + gear)
