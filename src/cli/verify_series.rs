@@ -35,7 +35,7 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
         require_readings(&inputs)?;
         let model = Model::of(args, inputs.chain.clone())?;
         let Observed { series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
-        let series = with_zeros(args, &model, &files, series)?;
+        let series = with_added(series, &missing(args, &model, &files)?);
         let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
         let images: Vec<&JudgedImage> = images.iter().collect();
         say_line!("{}", line("model", &args.urdf, &images));
@@ -49,9 +49,10 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let model = Model::of(args, judged_inputs.chain)?;
     let Observed { chain, series, files, .. } =
         nominal_inputs.with_recordings(&options)?.observe(&model.limits, &progress::of_series())?;
-    let series = in_told_postures(&model.robot, &series, &model.limits);
-    let nominal = judged((&Robot::nominal(chain), file), &series, &model.limits)?;
-    let series = with_zeros(args, &model, &files, series)?;
+    let missing = missing(args, &model, &files)?;
+    let series = in_told_postures(&model.robot, &with_added(series, &missing), &model.limits);
+    let as_shown: Vec<f64> = missing.iter().map(|offset| -offset).collect();
+    let nominal = judged((&Robot::nominal(chain), file), &with_added(series.clone(), &as_shown), &model.limits)?;
     let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
     let (images, nominal) = of_both(&images, &nominal);
     let mut reasons = compare(args, (file, &model.limits), &images, &nominal)?;
@@ -70,24 +71,26 @@ impl Model {
     fn of(args: &VerifyArgs, chain: Chain) -> Result<Self> {
         let robot = compensated(chain, args.compensation.as_deref())?;
         let stated = Stated::beside(&args.urdf, &robot);
+        // A flag that means nothing is refused before images are read.
+        args.readings.beside(stated.as_ref(), &args.urdf, &[])?;
         Ok(Self { limits: Stated::limits_of(stated.as_ref()), stated, robot })
     }
 }
 
-/// The series with the readings of the controller to which the model belongs; says which they are taken for.
-fn with_zeros(
-    args: &VerifyArgs,
-    model: &Model,
-    files: &[InputFile],
-    mut series: Vec<MeasuredSeries>,
-) -> Result<Vec<MeasuredSeries>> {
-    let Some(zeros) = args.readings.beside(model.stated.as_ref(), &args.urdf, files)? else {
-        return Ok(series);
-    };
-    say_line!("{}", zeros.line());
-    let stops = series.iter_mut().flat_map(|s| &mut s.stops);
-    stops.filter_map(|stop| stop.readings.as_mut()).for_each(|readings| add(readings, &zeros.missing));
-    Ok(series)
+/// What is to be added to readings so that they are of the controller to which the model belongs, rad or m; says which they are taken for.
+fn missing(args: &VerifyArgs, model: &Model, files: &[InputFile]) -> Result<Vec<f64>> {
+    let zeros = args.readings.beside(model.stated.as_ref(), &args.urdf, files)?;
+    zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
+    Ok(zeros.map_or_else(Vec::new, |zeros| zeros.missing))
+}
+
+/// The series with this added to all readings, rad or m, those of other postures included.
+fn with_added(mut series: Vec<MeasuredSeries>, offsets: &[f64]) -> Vec<MeasuredSeries> {
+    for s in &mut series {
+        let of_stops = s.stops.iter_mut().filter_map(|stop| stop.readings.as_mut());
+        of_stops.chain(s.postures.iter_mut().flatten()).for_each(|readings| add(readings, offsets));
+    }
+    series
 }
 
 /// What was measured, and how the model does there.

@@ -1,5 +1,6 @@
 //! What the solution of a description states of it, to be held against another measurement.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector6;
@@ -120,7 +121,7 @@ impl Stated {
 
     /// Whether one of these files of measurements is an input of the solution.
     pub fn was_fitted_to(&self, files: &[InputFile]) -> bool {
-        was_fitted_to(&self.record, files)
+        files.iter().filter(|file| is_measurement(&file.path)).any(|file| is_input(&self.record, file))
     }
 
     /// The solution.
@@ -129,10 +130,18 @@ impl Stated {
     }
 }
 
-/// Whether one of these files of measurements is an input of a solution.
-pub(super) fn was_fitted_to(record: &SolutionRecord, files: &[InputFile]) -> bool {
-    let is_input = |file: &InputFile| record.inputs.iter().any(|input| input.sha256 == file.sha256);
-    files.iter().filter(|file| is_measurement(&file.path)).any(is_input)
+/// Whether files of measurements are inputs of a solution, one of each folder; `None` where those of some folders are and those of others not.
+pub(super) fn were_fitted_to(record: &SolutionRecord, files: &[InputFile]) -> Option<bool> {
+    let mut folders: BTreeMap<Option<&Path>, bool> = BTreeMap::new();
+    for file in files.iter().filter(|file| is_measurement(&file.path)) {
+        *folders.entry(file.path.parent()).or_default() |= is_input(record, file);
+    }
+    let is_one = folders.values().any(|is_input| *is_input);
+    folders.values().all(|is_input| *is_input == is_one).then_some(is_one)
+}
+
+fn is_input(record: &SolutionRecord, file: &InputFile) -> bool {
+    record.inputs.iter().any(|input| input.sha256 == file.sha256)
 }
 
 fn rms(lengths: impl Iterator<Item = f64>) -> f64 {

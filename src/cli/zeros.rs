@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 
-use super::verify_stated::{Stated, was_fitted_to};
+use super::verify_stated::{Stated, were_fitted_to};
 use crate::error::{Code, Error, Result};
 use crate::output::restore::entered_offsets;
 use crate::output::solution_json::SolutionRecord;
@@ -60,14 +60,32 @@ impl ReadingsArgs {
     /// How readings to a solution are taken that came with some files; nothing where the exported robot takes the readings of the identification.
     ///
     /// # Errors
-    /// A solution that does not hang together.
+    /// A solution that does not hang together; the flag where the two readings are the same; none where the files of some folders were inputs
+    /// of the solution and those of others were not.
     pub(super) fn of(self, record: &SolutionRecord, files: &[InputFile]) -> Result<Option<Zeros>> {
         let entered = entered_offsets(record)?;
         if entered.iter().all(|offset| *offset == 0.0) {
-            return Ok(None);
+            return self.readings.map_or(Ok(None), |_| {
+                let what =
+                    "the result has no offsets to enter in the controller: readings before and after are the same";
+                Err(Error::new(Code::OptionConflict, "--readings", what, "leave the flag out"))
+            });
         }
-        let by_files = if was_fitted_to(record, files) { Readings::Before } else { Readings::After };
-        Ok(Some(Zeros::new(self.readings.unwrap_or(by_files), entered, self.readings.is_some())))
+        let readings = self.readings.map_or_else(|| by_files(record, files), Ok)?;
+        Ok(Some(Zeros::new(readings, entered, self.readings.is_some())))
+    }
+}
+
+/// When readings were taken that came with some files.
+fn by_files(record: &SolutionRecord, files: &[InputFile]) -> Result<Readings> {
+    match were_fitted_to(record, files) {
+        Some(true) => Ok(Readings::Before),
+        Some(false) => Ok(Readings::After),
+        None => {
+            let what = "is needed: the robot was identified from some of the folders and not from others, and readings are taken one way";
+            let remedy = "give these folders apart, or say --readings before or --readings after for all";
+            Err(Error::new(Code::OptionConflict, "--readings", what, remedy))
+        }
     }
 }
 

@@ -141,6 +141,53 @@ fn a_model_that_misses_more_than_its_solution_states_is_not_trusted() {
     assert!(mm > 1.0, "{mm}");
 }
 
+/// The same stops of the same robot, measured again.
+fn measured_again(series: &Path, into: &Path) -> PathBuf {
+    std::fs::create_dir(into).unwrap();
+    for entry in std::fs::read_dir(series).unwrap().map(Result::unwrap) {
+        std::fs::copy(entry.path(), into.join(entry.file_name())).unwrap();
+    }
+    let observations = std::fs::read_to_string(into.join("observations.csv")).unwrap();
+    std::fs::write(into.join("observations.csv"), observations + "\n").unwrap();
+    into.to_path_buf()
+}
+
+/// The offsets of the result are entered in the controller: its readings are those before or after.
+#[test]
+fn readings_to_a_mastered_robot_are_taken_one_way_for_all_folders() {
+    let nominal = kr6_urdf();
+    let folder = tempfile::tempdir().unwrap();
+    let series = simulated(&nominal, &folder.path().join("series"), "rigid", &[]);
+    let out = folder.path().join("result");
+    let [urdf, of, into] = [&nominal, &series, &out].map(|p| p.to_str().unwrap());
+    // Far off, so that it is determined.
+    with_other_zero(&series, "joint_a3", 1.0);
+    let model = ["--robot-model", "rigid", "--offsets", "mastering", "--out", into];
+    robotcal(&[&["identify", "--urdf", urdf, "--series", of], &model[..]].concat());
+    let corrected = out.join("kuka_kr6_r900.calibrated.urdf");
+    let again = measured_again(&series, &folder.path().join("again"));
+    let also = again.to_str().unwrap();
+    let judged = |flags: &[&str]| verdict(&corrected, &series, &[flags, &["--nominal", urdf]].concat());
+    let (_, _, own) = judged(&[]);
+    let (_, _, entered) = judged(&["--readings", "after"]);
+    assert!(entered > 2.0 * own, "{own} {entered}");
+    // One was an input of the result and the other was not.
+    assert_eq!(judged(&[also]).0, Some(2));
+    let (exit, _, both) = judged(&[also, "--readings", "before"]);
+    assert_eq!(exit, Some(0));
+    assert!((both - own).abs() < 0.1 * own, "{own} {both}");
+    // Poses of the controller are readings, too.
+    let poses = measured_again(&series, &folder.path().join("poses"));
+    with_poses(&poses, &nominal, true);
+    let (_, _, by_poses) = verdict(&corrected, &poses, &["--nominal", urdf, "--readings", "before"]);
+    assert!((by_poses - own).abs() < 0.1 * own, "{own} {by_poses}");
+    // Where the URDF holds all offsets, the flag means nothing.
+    let report = root().join("reports/kr6_small/kuka_kr6_r900.calibrated.urdf");
+    assert_eq!(verdict(&report, &series, &["--readings", "after"]).0, Some(2));
+    let other = verdict(&report, &series, &[]).0;
+    assert!(other != Some(2), "{other:?}");
+}
+
 #[test]
 fn the_series_that_a_model_was_fitted_to_proves_nothing() {
     let nominal = kr6_urdf();
@@ -156,14 +203,7 @@ fn the_series_that_a_model_was_fitted_to_proves_nothing() {
     let corrected = out.join("kuka_kr6_r900.calibrated.urdf");
     let own = verdict(&corrected, &series, &["--nominal", urdf]);
     assert_eq!((own.0, own.1), (Some(0), vec![Code::OwnMeasurement]));
-    // The same stops of the same robot, measured again.
-    let again = folder.path().join("again");
-    std::fs::create_dir(&again).unwrap();
-    for entry in std::fs::read_dir(&series).unwrap().map(Result::unwrap) {
-        std::fs::copy(entry.path(), again.join(entry.file_name())).unwrap();
-    }
-    let observations = std::fs::read_to_string(again.join("observations.csv")).unwrap();
-    std::fs::write(again.join("observations.csv"), observations + "\n").unwrap();
+    let again = measured_again(&series, &folder.path().join("again"));
     let other = verdict(&corrected, &again, &["--nominal", urdf]);
     assert_eq!((other.0, other.1), (Some(0), vec![]));
 }
