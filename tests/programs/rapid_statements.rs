@@ -222,6 +222,12 @@ fn points_of_an_unknown_routine_are_not_taken_for_those_of_the_world() {
         (own("MovePick", "MovePick p1,v1,z1,tGun;"), vec![], 0, vec![computed, unvisited]),
         (own("SpotL", "SpotL p1,v1,z1,tGun;"), vec![], 0, vec![computed, unvisited]),
         ("MovePick @,v1,z1,tGun;".to_owned(), vec![], 0, vec![LeftReason::NotATarget.name()]),
+        (
+            "MovePick [[300,0,400],[0,0,1,0],[0,0,0,0],ext0],v1,z1,tGun;".to_owned(),
+            vec![],
+            0,
+            vec![LeftReason::NotATarget.name()],
+        ),
     ] {
         let (text, run) = run(&cell, &body, &flags);
         let told = run.told();

@@ -24,12 +24,25 @@ pub(super) enum Node {
 }
 
 impl Node {
-    /// Place, quaternion, confdata and external axes.
+    /// Place and quaternion, and confdata and external axes, which may be computed.
     pub fn is_robtarget(&self) -> bool {
         let Self::List(parts) = self else { return false };
-        let lengths = parts.iter().map(|part| if let Self::List(numbers) = part { numbers.len() } else { 0 });
-        lengths.eq([3, 4, 4, 6])
+        has_shape(parts, &ROBTARGET) && parts[..2].iter().all(|part| matches!(part, Self::List(_)))
     }
+
+    /// How many values stand in its brackets.
+    fn count(&self) -> usize {
+        if let Self::List(values) = self { values.len() } else { 0 }
+    }
+}
+
+/// Numbers in the parts of a robtarget.
+const ROBTARGET: [usize; 4] = [3, 4, 4, 6];
+
+/// True where all parts that are no lists of so many values are computed: `[p.trans, p.rot, ..]`.
+fn has_shape(parts: &[Node], shape: &[usize]) -> bool {
+    let fits = |(part, wanted): (&Node, &usize)| !matches!(part, Node::List(_)) || part.count() == *wanted;
+    parts.len() == shape.len() && parts.iter().zip(shape).all(fits)
 }
 
 /// `Offs(p, x, y, z)` or `RelTool(p, x, y, z \Rx:=.. \Ry:=.. \Rz:=..)`.
@@ -195,16 +208,13 @@ pub(super) fn undeclared(name: &str) -> Why {
 /// The shape of the literal of a datum.
 pub(super) fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result<()> {
     let shape: &[usize] = match kind {
-        "ROBTARGET" => &[3, 4, 4, 6],
+        "ROBTARGET" => &ROBTARGET,
         "JOINTTARGET" => &[6, 6],
         _ => return Ok(()),
     };
     let Node::List(parts) = value else { return Ok(()) };
-    let count = |n: &Node| if let Node::List(l) = n { l.len() } else { 0 };
-    // `[p.trans, p.rot, ..]` is computed.
-    let fits = |(part, wanted): (&Node, &usize)| !matches!(part, Node::List(_)) || count(part) == *wanted;
-    if parts.len() != shape.len() || !parts.iter().zip(shape).all(fits) {
-        let found: Vec<usize> = parts.iter().map(count).collect();
+    if !has_shape(parts, shape) {
+        let found: Vec<usize> = parts.iter().map(Node::count).collect();
         let what = format!("{name} has {found:?} numbers in its brackets, a {} has {shape:?}", kind.to_lowercase());
         return Err(Error::new(Code::ProgramTargets, place, what, "complete it"));
     }
