@@ -75,7 +75,7 @@ fn what_a_handler_switches_holds_where_its_routine_goes_on() {
 fn what_a_trap_routine_switches_may_hold_behind_every_statement() {
     let cell = Cell::kuka(332);
     let frame = LeftReason::FrameUnknown.name();
-    let connect = "CONNECT i1 WITH Trap1;\nISignalDI di1,1,i1;";
+    let connect = "CONNECT i1 WITH Shifted;\nISignalDI di1,1,i1;";
     for (trap, body, corrected, left) in [
         (SHIFT, format!("{connect}\nPDispOff;\n{STEP}\n{STEP}"), 0, vec![frame, frame]),
         (SHIFT, format!("{STEP}\n{connect}\n{STEP}"), 1, vec![frame]),
@@ -85,7 +85,7 @@ fn what_a_trap_routine_switches_may_hold_behind_every_statement() {
         ("PDispOff;", format!("{connect}\n{STEP}\n{STEP}"), 2, vec![]),
         ("n:=n+1;", format!("{connect}\n{STEP}\n{STEP}"), 2, vec![]),
     ] {
-        assert_told(&cell, &format!("{body}\nENDPROC\nTRAP Trap1\n{trap}\nENDTRAP\nPROC Last()"), corrected, &left);
+        assert_told(&cell, &format!("{body}\nENDPROC\nTRAP Shifted\n{trap}\nENDTRAP\nPROC Last()"), corrected, &left);
     }
 }
 

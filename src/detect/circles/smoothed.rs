@@ -77,12 +77,7 @@ fn kept(sigma_px: f64) -> f64 {
 pub(super) fn as_before(mut found: CircleDetection, sigma_px: f64) -> CircleDetection {
     for f in &mut found.found {
         let edge = f.measured.blur_px;
-        let factor = variance_factor(edge, sigma_px);
-        for imaged in std::iter::once(&mut f.measured.outer).chain(&mut f.measured.inner) {
-            let [uu, uv, vv] = imaged.covariance.map(|c| c * factor);
-            let floor = SYSTEMATIC_PX * SYSTEMATIC_PX;
-            imaged.covariance = [uu + floor, uv, vv + floor];
-        }
+        f.measured.widen(variance_factor(edge, sigma_px), SYSTEMATIC_PX);
         f.measured.blur_px = before(edge, sigma_px);
     }
     found.observations = found.found.iter().flat_map(super::types::Found::observations).collect();
