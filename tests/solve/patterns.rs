@@ -159,6 +159,7 @@ fn a_lens_that_was_taken_or_tried_is_not_the_remedy() {
     ] {
         let remedy = Finding::from(ResidualPattern { is_fitted, tried, ..found.clone() }).remedy();
         for lens in [name, field] {
+            // words: the remedy is what the user follows, and names lenses
             assert_eq!(remedy.contains(lens), named == Some(lens), "{remedy}");
         }
     }

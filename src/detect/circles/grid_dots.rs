@@ -105,7 +105,9 @@ fn is_even((i, j): Cell, paper: &impl Fn(Cell) -> Option<f64>) -> bool {
     let goes_on = |d: &Cell| {
         let Some(beside) = at(*d, 1) else { return true };
         let bends = [at(*d, -1).map(|other| other + beside - 2.0 * own), at(*d, 2).map(|far| far + own - 2.0 * beside)];
-        let is_told = bends.iter().any(Option::is_some) || (beside - own).abs() < EVEN_LIGHT;
+        // Across a corner of the lattice there may be no third dot: rows and columns tell.
+        let is_across = d.0 != 0 && d.1 != 0;
+        let is_told = is_across || bends.iter().any(Option::is_some) || (beside - own).abs() < EVEN_LIGHT;
         is_told && bends.iter().flatten().all(|bend| bend.abs() < EVEN_LIGHT)
     };
     around.iter().all(goes_on)
