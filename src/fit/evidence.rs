@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::error::Code;
+use crate::problem::Family;
 use crate::solve::{Elimination, Fit, LinearProblem, Outcome, Status, System};
 
 /// Why something has no evidence.
@@ -54,7 +55,7 @@ pub fn fit_of_outcome(outcome: Outcome) -> Result<Fit, NoEvidence> {
 }
 
 /// `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what models of the same data share, with the whole information `N`
-/// (dense columns, latents and markers) at the optimum and the priors of columns and of what is latent at stops, and what holding directions of a family, and the factor of the prior of a lens, add to the density of the prior; `None` where it
+/// (dense columns, latents and markers) at the optimum and the priors of columns and of what is latent at stops, and what holding directions of a family adds to the density of its prior; `None` where it
 /// is not finite.
 pub fn log_evidence(linear: LinearProblem) -> Option<f64> {
     let system = System::with(Elimination::cheaper(linear), linear, 0.0);
@@ -77,7 +78,7 @@ fn of_determinant(linear: LinearProblem, system: &System, reduced: f64) -> Optio
         .sum();
     let of_latent: f64 = linear.stops().flat_map(|s| s.prior()).filter(|p| *p > 0.0).map(|p| 0.5 * p.ln()).sum();
     let families = linear.adjustment.problem.families.iter();
-    let held: f64 = families.map(|f| f.log_density_of_held() + f.log_density_of_factor()).sum();
+    let held: f64 = families.map(Family::log_density_of_held).sum();
     Some(-linear.lin.cost - 0.5 * (reduced + eliminated + distances) - priors + of_latent + held)
         .filter(|e| e.is_finite())
 }

@@ -132,8 +132,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         marker: Vec::new(),
         body: vec![[1.0; 2]; bodies.components],
     };
-    let of_camera = |k: usize| [Family::of_field(&layout, &state, k), Family::of_lens(&layout, &state, k)];
-    let families = (0..cameras.len()).flat_map(of_camera).flatten().collect();
+    let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
     let mut problem = Problem {
         layout,
         plates,

@@ -65,8 +65,6 @@ pub(super) fn fit_model(
     let Adjustment { problem, state } = &mut start;
     options.selection.apply(&mut problem.layout, state, &options.limits)?;
     let stated = options.selection.with_priors(&problem.layout)?;
-    // What the user states is not widened.
-    problem.families.retain(|f| !f.is_of_formula() || !f.columns.iter().any(|c| stated.contains(c)));
     problem.families.extend(Family::of_twists(&problem.layout, |c| stated.contains(&c)));
     if options.marker_tolerance == MarkerTolerance::Estimated {
         problem.noise.marker = vec![1.0; problem.plates.len()];

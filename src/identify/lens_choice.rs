@@ -29,7 +29,7 @@ const SOME_STOPS: usize = 250;
 const DECREMENT: f64 = 0.01;
 /// Rounds in which image noise and fit follow the lens.
 const ROUNDS: usize = 3;
-/// The same for a lens with a displacement field, or with coefficients that usual lenses have small.
+/// The same for a lens with a displacement field.
 const FIELD_ROUNDS: usize = 8;
 
 /// The fit of one robot model with the lenses that its evidence supports.
@@ -212,7 +212,7 @@ impl BetterLens {
         let mut other = fit.with_camera(self.index, self.camera);
         let problem = &mut other.problem;
         problem.noise.pixel_factor[self.index] = self.pixel_factor;
-        problem.families.iter_mut().filter(|f| f.is_of_lens()).for_each(|f| f.take_factor(&self.families));
+        problem.families.iter_mut().filter(|f| f.held.ncols() > 0).for_each(|f| f.take_factor(&self.families));
         other
     }
 }
@@ -222,8 +222,8 @@ fn evidence(
     (camera, depths_m): (usize, &[f64; 2]),
     lens: Lens,
 ) -> Option<(LensEvidence, Option<BetterLens>)> {
-    // The size of a displacement field is found from above, that of unusual coefficients by doubling.
-    let rounds = if lens.has_field() || lens.has_usual_priors() { FIELD_ROUNDS } else { ROUNDS };
+    // The size of a displacement field is found from above.
+    let rounds = if lens.has_field() { FIELD_ROUNDS } else { ROUNDS };
     let outcome = settled(with_lens(fit, (camera, depths_m), lens)?, rounds);
     let log_evidence = log_evidence_of_outcome(&outcome).ok()?;
     let linear = outcome.linear()?;
@@ -232,7 +232,7 @@ fn evidence(
 
 /// The optimum near an adjustment. Image noise follows the lens; joint noise, tilt and the sizes of families stay.
 fn settled(mut near: Adjustment, rounds: usize) -> Outcome {
-    near.problem.families.retain(Family::is_of_lens);
+    near.problem.families.retain(|f| f.held.ncols() > 0);
     let settings = Settings { decrement: DECREMENT, ..Settings::default() };
     let options =
         ComponentOptions { joint: false, displacement: false, rounds, settings, ..ComponentOptions::default() };

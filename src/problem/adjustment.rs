@@ -141,15 +141,14 @@ impl Adjustment {
     pub fn with_camera(&self, index: usize, camera: Camera) -> Self {
         let mut other = self.clone();
         let Self { problem, state } = &mut other;
-        let old = problem.layout.cameras[index].clone();
-        problem.families.retain(|f| !f.columns.iter().any(|c| old.contains(c)));
+        let field = problem.layout.fields[index].clone();
+        problem.families.retain(|f| !f.columns.iter().any(|c| field.contains(c)));
         let (layout, from, moved) = problem.layout.with_camera(index, &problem.cameras[index], &camera);
         problem.layout = layout;
         let columns = problem.families.iter_mut().flat_map(|f| &mut f.columns);
         columns.filter(|c| **c >= from).for_each(|c| *c = c.saturating_add_signed(moved));
         state.cameras[index] = camera;
         problem.families.extend(Family::of_field(&problem.layout, state, index));
-        problem.families.extend(Family::of_lens(&problem.layout, state, index));
         other
     }
 

@@ -11,13 +11,6 @@ const HELD: f64 = 1e-4;
 /// degrees of freedom has 95 % of the factor between 1/2 and 2 (`1.96 / sqrt(2 n) = ln 2`).
 const TWISTS_DRAWN: f64 = 4.0;
 
-/// The same for coefficients of a lens, of which there are two, and which can follow what they do not describe: with this weight they have to
-/// be four times their usual size and determined to double it (with 4, a lens that is no prism would widen its own prior without end).
-const LENS_DRAWN: f64 = 10.0;
-
-/// How names of families of coefficients begin.
-const LENS: &str = "lens formula";
-
 /// Name of the family of the twists.
 const TWISTS: &str = "origins of the joints";
 
@@ -48,26 +41,6 @@ impl Family {
         })
     }
 
-    /// The coefficients of the lens of camera `camera` that a prior of usual lenses holds where the images hardly tell them from others: an
-    /// unusual lens widens it. `None` for a lens without any.
-    pub fn of_lens(layout: &Layout, state: &State, camera: usize) -> Option<Self> {
-        let of_camera = &state.cameras[camera];
-        let usual = (0..of_camera.parametric()).filter(|&k| of_camera.prior_is_usual(k));
-        let columns: Vec<usize> = usual.map(|k| layout.cameras[camera].start + k).collect();
-        (!columns.is_empty())
-            .then(|| Self { drawn: LENS_DRAWN, ..Self::new(&format!("{LENS} {camera}"), layout, columns) })
-    }
-
-    /// True for what follows the lens of a camera: its formula, or the field on top of it.
-    pub fn is_of_lens(&self) -> bool {
-        self.held.ncols() > 0 || self.is_of_formula()
-    }
-
-    /// True for coefficients of the formula of a lens.
-    pub fn is_of_formula(&self) -> bool {
-        self.name.starts_with(LENS)
-    }
-
     /// The twists of the joints whose priors nobody has stated: how far robots are from nominal is known to a factor of two.
     pub fn of_twists(layout: &Layout, is_stated: impl Fn(usize) -> bool) -> Option<Self> {
         let columns: Vec<usize> =
@@ -83,15 +56,6 @@ impl Family {
     /// The factor that sums of squares and the number of determined parameters ask for.
     pub fn asked(&self, squares: f64, determined: f64) -> f64 {
         ((squares + self.drawn) / (determined + self.drawn)).sqrt()
-    }
-
-    /// What the prior of the factor adds to the log evidence: its density, relative to that of the factor 1, under a scaled inverse chi-squared
-    /// prior with `drawn` degrees of freedom. Of coefficients of a lens alone, as models that are compared have all other families in common.
-    pub fn log_density_of_factor(&self) -> f64 {
-        match self.is_of_formula() {
-            true => -self.drawn * (self.factor.ln() + 0.5 * (self.factor.powi(-2) - 1.0)),
-            false => 0.0,
-        }
     }
 
     /// A family of columns at their present priors.

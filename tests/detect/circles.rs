@@ -84,7 +84,7 @@ fn clipped_markers_come_back_and_a_covered_one_does_not() {
     assert!(farthest < 0.3, "{farthest} px");
 }
 
-/// Strong compression rings beside every edge and flattens the paper: the markers are found, and sigma covers what it did to them.
+/// Strong compression rings beside every edge and flattens the paper: the markers are found, within 0.05 px.
 #[test]
 fn strong_compression_costs_no_marker() {
     for quality in [35, 30] {
@@ -95,7 +95,7 @@ fn strong_compression_costs_no_marker() {
         report(&scene, &found, &e);
         assert_eq!(e.wrong, 0, "{quality}");
         assert!(e.found as f64 >= 0.9 * e.visible as f64, "{quality}: {} of {}", e.found, e.visible);
-        assert!(e.nees() < 2.0 && e.rms() < 0.1, "{quality}: nees {}, rms {} px", e.nees(), e.rms());
+        assert!(e.rms() < 0.05, "{quality}: rms {} px", e.rms());
     }
 }
 

@@ -265,9 +265,6 @@ pub struct CircleDetection {
 const SAME_PLACE_PX: f64 = 2.0;
 /// Share of the identified markers that is many.
 const MANY_CLIPPED: f64 = 0.1;
-/// What compression, or another thing that leaves edges no blurred steps, displaces centres by beyond noise, px per axis; seen in rendered
-/// pictures of JPEG quality 20 to 35.
-const SPOILT_PX: f64 = 0.02;
 /// Clipped edges, and those that are no blurred steps.
 const SPOILT: [Reason; 3] = [Reason::Saturated, Reason::EdgeModel, Reason::NoConvergence];
 
@@ -310,19 +307,16 @@ impl CircleDetection {
     /// picture.
     pub(super) fn complete(&mut self, smoothed: Self, reasons: &[Reason]) {
         let lost = self.dropped.iter().filter(|d| reasons.contains(&d.reason));
-        let lost: BTreeMap<u32, &DroppedCandidate> = lost.filter_map(|d| Some((d.marker?, d))).collect();
-        let taken = |mut f: Found| {
-            let (centre, was) = (f.measured.outer.ellipse.centre, lost.get(&f.marker)?);
-            if was.reason != Reason::Saturated {
-                f.measured.widen(1.0, SPOILT_PX);
-            }
-            ((was.uv[0] - centre[0]).hypot(was.uv[1] - centre[1]) < SAME_PLACE_PX).then_some(f)
+        let lost: BTreeMap<u32, [f64; 2]> = lost.filter_map(|d| Some((d.marker?, d.uv))).collect();
+        let is_lost = |f: &Found| {
+            let centre = f.measured.outer.ellipse.centre;
+            lost.get(&f.marker).is_some_and(|uv| (uv[0] - centre[0]).hypot(uv[1] - centre[1]) < SAME_PLACE_PX)
         };
         if self.found.is_empty() {
             (self.blur_px, self.noise) = (smoothed.blur_px, smoothed.noise);
         }
         let before = self.found.len();
-        self.found.extend(smoothed.found.into_iter().filter_map(taken));
+        self.found.extend(smoothed.found.into_iter().filter(is_lost));
         self.found.sort_by_key(|f| f.marker);
         self.found.dedup_by_key(|f| f.marker);
         self.smoothed += self.found.len() - before;

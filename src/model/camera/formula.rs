@@ -97,11 +97,6 @@ pub(super) trait Formula {
         f64::INFINITY
     }
 
-    /// True where the prior says how large usual lenses have a coefficient: its size is then a variance component, which an unusual lens widens.
-    fn prior_is_usual(_coefficient: usize) -> bool {
-        false
-    }
-
     /// Distance from the axis, on the plane z = 1, of the image of a ray at an angle (rad) from it, where all coefficients are zero.
     fn ideal_radius(angle: f64) -> f64 {
         angle.tan()

@@ -52,11 +52,6 @@ macro_rules! lenses {
                 match self { $(Self::$lens => <$formula>::prior_sigma(coefficient),)+ }
             }
 
-            /// True where that prior is the size that usual lenses have, which the data may widen.
-            pub fn prior_is_usual(self, coefficient: usize) -> bool {
-                match self { $(Self::$lens => <$formula>::prior_is_usual(coefficient),)+ }
-            }
-
             /// Distance from the axis, on the plane z = 1, of the image of a ray at an angle (rad) from it, where all coefficients are zero.
             pub fn ideal_radius(self, angle: f64) -> f64 {
                 match self { $(Self::$lens => <$formula>::ideal_radius(angle),)+ }
@@ -120,11 +115,6 @@ impl Lens {
     /// True with a displacement field on top of the formula.
     pub fn has_field(self) -> bool {
         self != self.formula()
-    }
-
-    /// True with coefficients whose priors the data may widen.
-    pub fn has_usual_priors(self) -> bool {
-        (0..self.coefficient_names().len()).any(|k| self.prior_is_usual(k))
     }
 
     /// The lens of a name in files.

@@ -104,11 +104,6 @@ impl Camera {
         }
     }
 
-    /// True where the prior of parameter `index` is how large usual lenses have it, which the data may widen.
-    pub fn prior_is_usual(&self, index: usize) -> bool {
-        index.checked_sub(PINHOLE.len()).is_some_and(|k| index < self.parametric() && self.lens.prior_is_usual(k))
-    }
-
     /// Unit of parameter `index`: "px" or "1".
     pub fn parameter_unit(&self, index: usize) -> &'static str {
         if (PINHOLE.len()..self.parametric()).contains(&index) { "1" } else { "px" }

@@ -4,7 +4,7 @@ use super::brown::Brown;
 use super::formula::{Coefficients, Distorted, Formula, Ideal};
 
 /// Prior sigma of `s1` and `s3`. To first order `s1 r^2` is a shift of the principal point with a turn of the camera and `p2`: at a width of 50
-/// degrees 1e-3 of it is 0.32 px, of which 0.012 px are left when these follow, and takes the principal point along by 4.6 px. A lens that has more of it, and shows it, widens the prior.
+/// degrees 1e-3 of it is 0.32 px, of which 0.012 px are left when these follow, and takes the principal point along by 4.6 px.
 const PRISM_SIGMA: f64 = 3e-4;
 
 /// Prior sigma of `s2` and `s4`.
@@ -24,10 +24,6 @@ impl Formula for ThinPrism {
             5.. => PRISM_FOURTH_ORDER_SIGMA,
             _ => f64::INFINITY,
         }
-    }
-
-    fn prior_is_usual(coefficient: usize) -> bool {
-        matches!(coefficient, 5 | 7)
     }
 
     #[inline(always)]
