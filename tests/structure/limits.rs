@@ -268,7 +268,6 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("problem/equations.rs POSE", "layout of a matrix"),
     ("problem/equations.rs RESIDUAL", "layout of a matrix"),
     ("problem/family.rs HELD", "rounding"),
-    ("problem/family.rs LENS_DRAWN", "prior of a variance component"),
     ("problem/family.rs TWISTS_DRAWN", "prior of a variance component"),
     ("problem/given.rs FIXED_MARKER_SIGMA_M", "rounding of a prior"),
     ("problem/given.rs HUBER", "loss function of the solver"),

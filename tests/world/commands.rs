@@ -280,10 +280,11 @@ fn a_table_of_joint_vectors_is_read_as_every_other_table() {
     // Row numbers, as pandas writes them, are no joint.
     let said = [format!("{names}\n{row}\n{row}\n"), format!(",{names}\n0,{row}\n1,{row}\n")].map(|table| {
         std::fs::write(&at, table).unwrap();
-        let args = ["show", &root("reports/kr6_small/solution.json"), "--at", at.to_str().unwrap(), "--at-unit", "deg"];
-        let output = robotcal(&args);
+        let [at, out] = [&at, &folder.path().join("out")].map(|p| p.to_str().unwrap().to_owned());
+        let solution = root("reports/kr6_small/solution.json");
+        let output = robotcal(&["show", &solution, "--at", &at, "--at-unit", "deg", "--out", &out]);
         assert_eq!(output.status.code(), Some(0), "{}", text(&output));
-        output.stdout
+        std::fs::read_to_string(Path::new(&out).join("at.csv")).unwrap()
     });
     assert_eq!(said[0], said[1]);
 }
