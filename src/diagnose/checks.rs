@@ -3,11 +3,11 @@
 use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::{
-    camera_model, camera_pattern, contradicted_distances, exchanged_readings, extrapolates, few_images, focus,
-    held_near_nominal, joint_noise, left_out_bodies, left_out_images, left_out_observations, length_standard, loose,
-    many_left_out, marker_off, measurement_scatter, moved, no_gain, odd_image, parameter_off, plate_size, pose_step,
-    repeated_measurements, rounded_readings, scatter, shifted_measurements, small_gain, stated_noise, tag_size,
-    undetermined, zeros_off,
+    camera_model, camera_pattern, contradicted_distances, exchanged_pictures, exchanged_readings, extrapolates,
+    few_images, focus, held_near_nominal, joint_noise, left_out_bodies, left_out_images, left_out_observations,
+    length_standard, loose, many_left_out, marker_off, measurement_scatter, moved, no_gain, odd_image, parameter_off,
+    plate_size, pose_step, reading_ratio, repeated_measurements, rounded_readings, scatter, shifted_measurements,
+    small_gain, stated_noise, tag_size, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -55,6 +55,10 @@ pub const CHECKS: &[Check] = &[
             (Finding::Displaced(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             (Finding::FocusChange(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::FocusChange(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
+            (Finding::ImagesShifted(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
+            (Finding::ImagesShifted(own), Finding::FocusChange(focus)) => own.explains_focus(focus),
+            (Finding::ImagesShifted(own), Finding::Displaced(moved)) => own.looks_like(moved),
+            (Finding::ImagesShifted(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             (Finding::ZeroMoved(own), Finding::LooseMounting(_)) => own.explains_two_places(),
             (Finding::ZeroMoved(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             (Finding::Displaced(own), Finding::MeasurementsScatter(other)) => {
@@ -88,16 +92,47 @@ pub const CHECKS: &[Check] = &[
         },
         ..check("focus", Stage::FreePoses(|p, s| found(focus::check(p, s))))
     },
+    Check {
+        // It grows with the reading, as what is loose or moved does not.
+        explains: |own, other| match (own, other) {
+            (
+                Finding::ReadingRatio(own),
+                Finding::Displaced(_)
+                | Finding::ImagesShifted(_)
+                | Finding::ZeroMoved(_)
+                | Finding::LooseMounting(_)
+                | Finding::JointNoiseLarge(_)
+                | Finding::BodyMoved(_)
+                | Finding::NoGain(_),
+            ) => own.explains(),
+            (Finding::ReadingRatio(own), Finding::NoiseContradicted(noise)) => {
+                own.explains() && noise.is_explained_by(Weight::Gate)
+            }
+            _ => false,
+        },
+        ..check("reading_ratio", Stage::Fit(|a, b, s| found(reading_ratio::check(a, b, s))))
+    },
     check("camera_model", Stage::FreePoses(|p, s| found(camera_model::check(p, s)))),
     check("camera_pattern", Stage::Fit(|a, b, s| found(camera_pattern::check(a, b, s)))),
     check("few_images", Stage::Fit(|a, b, s| found(few_images::check(a, b, s)))),
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
     check("stated_noise", Stage::Fit(|a, b, s| found(stated_noise::check(a, b, s)))),
     Check {
-        explains: |_, other| matches!(other, Finding::NoiseContradicted(noise) if noise.is_explained_by(Weight::Gate)),
-        ..check("loose", Stage::Fit(|a, b, s| found(loose::check(a, b, s))))
+        explains: |own, other| match (own, other) {
+            (Finding::ImagesShifted(own), Finding::FocusChange(focus)) => own.explains_focus(focus),
+            (_, Finding::NoiseContradicted(noise)) => noise.is_explained_by(Weight::Gate),
+            _ => false,
+        },
+        ..check("loose", Stage::Fit(loose::check))
     },
     check("moved", Stage::LeftOut(|a, s| found(moved::check(a, s)))),
+    Check {
+        explains: |own, other| match (own, other) {
+            (Finding::ExchangedPictures(own), Finding::BodyMoved(moved)) => own.explains(&moved.images),
+            _ => false,
+        },
+        ..check("exchanged_pictures", Stage::LeftOut(|a, s| found(exchanged_pictures::check(a, s))))
+    },
     check("exchanged_readings", Stage::LeftOut(|a, _| found(exchanged_readings::check(a)))),
     Check {
         explains: |_, other| matches!(other, Finding::ManyLeftOut(_)),
@@ -154,7 +189,7 @@ pub struct Diagnosis<'a> {
 impl<'a> Diagnosis<'a> {
     /// Nothing is found yet.
     pub fn new(setting: CheckContext<'a>) -> Self {
-        Self { setting, found: Default::default() }
+        Self { setting, found: std::array::from_fn(|_| Vec::new()) }
     }
 
     /// Runs the checks of a stage in their order.

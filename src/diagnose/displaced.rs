@@ -34,6 +34,8 @@ pub enum Displacement {
     FromThenOn,
     /// Where its axis x, y or z (0, 1, 2) points up: held by its weight only.
     AxisUp(usize),
+    /// In these, and not in others that stand between them.
+    ByTurns,
     /// More in each than in the one before: it creeps.
     AllThrough,
     /// In all of them: elsewhere than in the other series.
@@ -105,7 +107,7 @@ impl Displaced {
 impl Kind for Displaced {
     fn code(&self) -> Code {
         let of = |displaced, drifts, loose| match self.displacement {
-            Displacement::FromThenOn | Displacement::InAll => displaced,
+            Displacement::FromThenOn | Displacement::InAll | Displacement::ByTurns => displaced,
             Displacement::AllThrough => drifts,
             Displacement::AxisUp(_) => loose,
         };
@@ -176,6 +178,11 @@ impl Kind for Displaced {
                 self.images.len(),
                 some_of(&self.images, MOST_IMAGES)
             ),
+            Displacement::ByTurns => format!(
+                "the {body} stands in two places by turns: in {} images ({}) {size} from where it is in the others",
+                self.images.len(),
+                some_of(&self.images, MOST_IMAGES)
+            ),
             Displacement::AllThrough => {
                 format!(
                     "from the first to the last {} the {body} creeps by {size}: it is not yet warm, or gives way",
@@ -233,6 +240,9 @@ impl Kind for Displaced {
                 Carried::Bracket => format!("give all targets other names in {}", self.series),
                 Carried::Fixture => format!("give all contacts other names in {}", self.series),
             },
+            Displacement::ByTurns => {
+                "give the rows of each place a placement of their own in joints.csv, or fasten it and take the series again".into()
+            }
             Displacement::AxisUp(_) => "fasten it, and take the series again".into(),
             Displacement::AllThrough => {
                 "let camera and robot warm up, fasten what creeps, and take the series again".into()

@@ -7,11 +7,13 @@ use super::camera_pattern::ResidualPattern;
 use super::computed_postures::ComputedPostures;
 use super::contradicted_distances::ContradictedDistances;
 use super::displaced::Displaced;
+use super::exchanged_pictures::ExchangedPictures;
 use super::exchanged_readings::ExchangedReadings;
 use super::extrapolates::Extrapolates;
 use super::few_images::FewImages;
 use super::focus::FocusChange;
 use super::held_near_nominal::HeldNearNominal;
+use super::images_shifted::ImagesShifted;
 use super::joint_noise::JointNoiseLarge;
 use super::kind::{Kind, Quantity, Subject, Weight};
 use super::left_out_bodies::MeasurementsLeftOut;
@@ -19,7 +21,7 @@ use super::left_out_images::ImagesLeftOut;
 use super::left_out_observations::ObservationsLeftOut;
 use super::length_standard::ContradictedLengths;
 use super::lens_not_in_ros::LensNotInRos;
-use super::loose::LooseMounting;
+use super::loose_mounting::LooseMounting;
 use super::many_left_out::ManyLeftOut;
 use super::marker_off::MarkerOff;
 use super::measurement_scatter::MeasurementsScatter;
@@ -30,6 +32,7 @@ use super::noticed::Noticed;
 use super::odd_image::OddImage;
 use super::parameter_off::ParameterOff;
 use super::plate_size::DoubtedSize;
+use super::reading_ratio::ReadingRatio;
 use super::repeated_measurements::RepeatedMeasurements;
 use super::rounded_readings::ReadingsRounded;
 use super::scatter::LargeScatter;
@@ -76,6 +79,7 @@ findings! {
     ContradictedLengths,
     Displaced,
     DoubtedSize,
+    ExchangedPictures,
     ExchangedReadings,
     Extrapolates,
     FewImages,
@@ -83,6 +87,7 @@ findings! {
     HeldNearNominal,
     FocusChange,
     ImagesLeftOut,
+    ImagesShifted,
     JointNoiseLarge,
     LargeScatter,
     LensNotInRos,
@@ -101,6 +106,7 @@ findings! {
     ParameterOff,
     RepeatedMeasurements,
     ReadingsRounded,
+    ReadingRatio,
     ResidualPattern,
     ShiftedMeasurements,
     SmallGain,

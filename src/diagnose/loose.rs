@@ -1,30 +1,22 @@
-//! A camera that sits loosely on its mount: it tips over between two positions, and the joint noise shows two heaps.
+//! A camera that sits loosely on its mount: it tips over between two positions, and the joint noise shows two heaps. So it does where the plate has
+//! two places by turns, or the pictures: what stands out most clearly from the spread of its heaps is named.
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, some_of};
+use nalgebra::Vector6;
+
+use super::displaced::{Carried, Displaced, Displacement};
+use super::finding::Finding;
+use super::images_shifted::ImagesShifted;
+use super::kind::{CheckContext, Weight};
+use super::loose_mounting::LooseMounting;
+use super::moved::CHANGES;
+use super::step_candidates::Changed;
+use super::step_rows::{Linear, Step};
 use crate::assess::{Accuracy, Limits};
-use crate::error::Code;
 use crate::fit::Fit;
+use crate::geom::Pose;
 use crate::linalg::median;
-
-/// Most images that are named.
-const MOST_IMAGES: usize = 5;
-
-/// A camera tips over between two positions.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LooseMounting {
-    /// Name of the mounting.
-    pub mounting: String,
-    /// About which axis of the camera: pitch, yaw, roll.
-    pub turn: &'static str,
-    /// Angle between the positions, rad.
-    pub angle_rad: f64,
-    /// Spread of either, rad.
-    pub spread_rad: f64,
-    /// Images in the rarer position.
-    pub images: Vec<String>,
-    /// Images in all.
-    pub of: usize,
-}
+use crate::problem::Image;
+use crate::series::CameraMount;
 
 /// What the axes of the camera do, in the order x, y, z.
 const TURNS: [&str; 3] = ["pitch", "yaw", "roll"];
@@ -63,76 +55,176 @@ fn split(values: &[f64], fewest: usize) -> Option<Split> {
     Some(Split { distance, spread: (squares / (n - 2) as f64).sqrt(), smaller })
 }
 
-/// Every mounting whose camera turned between two positions.
-pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<LooseMounting> {
+/// Every mounting whose camera, or whose plate, has two places by turns.
+pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Finding> {
     let fit = setting.with_noise_found(fit);
-    (0..fit.problem.mountings.len()).filter_map(|m| loose(fit, m, setting.limits)).collect()
+    (0..fit.problem.mountings.len()).filter_map(|m| of_mounting(fit, m, setting)).collect()
 }
 
-fn loose(fit: &Fit, mounting: usize, limits: &Limits) -> Option<LooseMounting> {
-    let problem = &fit.problem;
-    let turns: Vec<(usize, [f64; 3])> = problem
-        .used()
-        .filter(|(i, image)| image.mounting == mounting && fit.taken_from(*i).joints() > 0)
-        .filter_map(|(i, _)| {
-            let (seen, predicted) = (fit.camera_from_plate(i)?, fit.camera_by_readings(i)?);
-            let turn = (seen * predicted.inverse()).log();
-            Some((i, [turn[3], turn[4], turn[5]]))
-        })
-        .collect();
-    if turns.len() < limits.loose_images {
-        return None;
-    }
-    let (axis, found) = (0..3)
-        .filter_map(|axis| {
-            let about_axis: Vec<f64> = turns.iter().map(|(_, t)| t[axis]).collect();
-            split(&about_axis, limits.loose_images_in_heap).map(|s| (axis, s))
-        })
-        .max_by(|a, b| (a.1.distance / a.1.spread).total_cmp(&(b.1.distance / b.1.spread)))?;
-    if found.distance < limits.loose_turn_rad || found.distance < no_chance(turns.len(), limits) * found.spread {
-        return None;
-    }
-    Some(LooseMounting {
-        mounting: problem.mountings[mounting].clone(),
-        turn: TURNS[axis],
-        angle_rad: found.distance,
-        spread_rad: found.spread,
-        images: found.smaller.iter().map(|&k| problem.images[turns[k].0].name.clone()).collect(),
-        of: turns.len(),
+/// The clearest of what a mounting shows.
+fn of_mounting(fit: &Fit, mounting: usize, setting: &CheckContext) -> Option<Finding> {
+    let limits = setting.limits;
+    let camera =
+        Heaps::of(fit, |image| image.mounting == mounting, |seen, predicted| (seen * predicted.inverse()).log());
+    let camera = camera.loose(limits);
+    let plates = (0..fit.problem.placements.len()).filter_map(|placement| {
+        let shown = |image: &Image| image.mounting == mounting && image.placement == placement;
+        let heaps = Heaps::of(fit, shown, |seen, predicted| (predicted.inverse() * seen).log());
+        Some((placement, heaps.moved(limits)?))
+    });
+    let plate = plates.max_by(|a, b| a.1.clearness().total_cmp(&b.1.clearness()));
+    let clearest = |two: &TwoPlaces| camera.as_ref().is_none_or(|camera| camera.clearness() < two.clearness());
+    let plate = plate.filter(|(_, two)| clearest(two)).and_then(|(placement, two)| {
+        let step = as_plate(fit, (placement, mounting), &two)?;
+        Some((placement, two, step))
+    });
+    let (changed, two) = match (&plate, &camera) {
+        (Some((placement, two, _)), _) => (Changed::Placement(*placement), two),
+        (None, Some(two)) => (Changed::Mounting(mounting), two),
+        (None, None) => return None,
+    };
+    let shifted = shifted(fit, changed, two).map(Finding::from);
+    shifted.or_else(|| match plate {
+        Some((_, two, step)) => Some(two.displaced(fit, &step, mounting, setting).into()),
+        None => camera.map(|two| two.loose_mounting(fit, mounting).into()),
     })
 }
 
-impl Kind for LooseMounting {
-    fn code(&self) -> Code {
-        Code::LooseMounting
+/// A plate that stands elsewhere in these images, where that explains more than a camera that does.
+fn as_plate(fit: &Fit, (placement, mounting): (usize, usize), two: &TwoPlaces) -> Option<Step> {
+    let (problem, linear) = (&fit.problem, Linear::of(fit.linear()));
+    let step = |changed| linear.most(problem, &[linear.at(problem, changed, &two.smaller)?]);
+    let plate = step(Changed::Placement(placement))?;
+    let camera = step(Changed::Mounting(mounting));
+    camera.is_none_or(|camera| camera.fall < plate.fall).then_some(plate)
+}
+
+/// The shift of the pictures, where it explains more than that body.
+fn shifted(fit: &Fit, changed: Changed, two: &TwoPlaces) -> Option<ImagesShifted> {
+    if two.changes < CHANGES {
+        return None;
+    }
+    let (problem, linear) = (&fit.problem, Linear::of(fit.linear()));
+    let moved = linear.most(problem, &[linear.at(problem, changed, &two.smaller)?])?;
+    let mut step = linear.seen_otherwise(problem, &moved, two.smaller.len())?;
+    tracing::debug!(?changed, moved = moved.fall, change = ?step.change, "pictures by turns");
+    step.explains_most = true;
+    let Changed::Centre(camera) = step.changed else { return None };
+    Some(ImagesShifted::of(&step, problem, camera, two.names(fit)))
+}
+
+/// By how much a body seems to be elsewhere in each of some images, by their index.
+struct Heaps(Vec<(usize, Vector6<f64>)>);
+
+/// Two heaps of images.
+struct TwoPlaces {
+    /// Which component of the twist tells them best.
+    axis: usize,
+    /// Distance of the heaps along it, and the spread of either, rad or m.
+    distance: f64,
+    spread: f64,
+    /// Images in the rarer place.
+    smaller: Vec<usize>,
+    /// Share of the squares of its shift, or of its turn, that the two places explain.
+    share: f64,
+    /// Images in all.
+    of: usize,
+    /// How often one place follows on the other, in the order of the images.
+    changes: usize,
+}
+
+impl Heaps {
+    fn of(fit: &Fit, shown: impl Fn(&Image) -> bool, twist: impl Fn(Pose, Pose) -> Vector6<f64>) -> Self {
+        let own = fit.problem.used().filter(|(i, image)| shown(image) && fit.taken_from(*i).joints() > 0);
+        let told = |(i, _)| Some((i, twist(fit.camera_from_plate(i)?, fit.camera_by_readings(i)?)));
+        Self(own.filter_map(told).collect())
     }
 
-    fn subjects(&self) -> Vec<Subject> {
-        let body = Subject::Body(self.mounting.clone());
-        std::iter::once(body).chain(self.images.iter().cloned().map(Subject::Image)).collect()
+    /// Along the axis of some that tells two places best.
+    fn split(&self, axes: impl Iterator<Item = usize>, limits: &Limits) -> Option<TwoPlaces> {
+        let of = self.0.len();
+        if of < limits.loose_images {
+            return None;
+        }
+        let along = |axis: usize| self.0.iter().map(|(_, t)| t[axis]).collect::<Vec<f64>>();
+        let (axis, found) = axes
+            .filter_map(|axis| split(&along(axis), limits.loose_images_in_heap).map(|s| (axis, s)))
+            .max_by(|a, b| (a.1.distance / a.1.spread).total_cmp(&(b.1.distance / b.1.spread)))?;
+        let Split { distance, spread, smaller } = found;
+        if distance < no_chance(of, limits) * spread {
+            return None;
+        }
+        let is_member: Vec<bool> = (0..of).map(|k| smaller.contains(&k)).collect();
+        let changes = is_member.windows(2).filter(|two| two[0] != two[1]).count();
+        let parts = smaller.iter().map(|&k| self.0[k].0).collect();
+        let (inside, outside): (Vec<usize>, Vec<usize>) = (0..of).partition(|&k| is_member[k]);
+        let squares = |heap: &[usize]| {
+            let mean = heap.iter().map(|&k| self.0[k].1).sum::<Vector6<f64>>() / heap.len().max(1) as f64;
+            let off = heap.iter().map(|&k| self.0[k].1 - mean);
+            off.fold([0.0; 2], |[shift, turn], off| {
+                [shift + off.fixed_rows::<3>(0).norm_squared(), turn + off.fixed_rows::<3>(3).norm_squared()]
+            })
+        };
+        let all = squares(&(0..of).collect::<Vec<usize>>());
+        let (one, other) = (squares(&inside), squares(&outside));
+        let left = [0, 1].map(|kind| one[kind] + other[kind]);
+        let kind = axis / 3;
+        let share = 1.0 - left[kind] / all[kind];
+        Some(TwoPlaces { axis, distance, spread, smaller: parts, share, of, changes })
     }
 
-    fn quantities(&self) -> Vec<Quantity> {
-        vec![Quantity::new("angle", self.angle_rad, "rad").with_sigma(self.spread_rad)]
+    /// A camera that tips over.
+    fn loose(&self, limits: &Limits) -> Option<TwoPlaces> {
+        self.split(3..6, limits).filter(|two| two.distance >= limits.loose_turn_rad)
     }
 
-    fn place(&self) -> String {
-        format!("camera mount {}", self.mounting)
+    /// A plate that has two places by turns: one that was moved once is found by its row.
+    fn moved(&self, limits: &Limits) -> Option<TwoPlaces> {
+        let matters = |two: &TwoPlaces| match two.axis {
+            0..3 => two.distance > limits.displaced_m,
+            _ => two.distance > limits.displaced_rad,
+        };
+        self.split(0..6, limits)
+            .filter(|two| matters(two) && two.share > limits.displaced_share && two.changes >= CHANGES)
+    }
+}
+
+impl TwoPlaces {
+    fn clearness(&self) -> f64 {
+        self.distance / self.spread
     }
 
-    fn seen(&self) -> String {
-        format!(
-            "the {} of the camera has two values {:.2} mrad apart ({} of {} images: {}): it is loose on its mount or slips, or a joint has backlash",
-            self.turn,
-            1e3 * self.angle_rad,
-            self.images.len(),
-            self.of,
-            some_of(&self.images, MOST_IMAGES)
-        )
+    fn names(&self, fit: &Fit) -> Vec<String> {
+        self.smaller.iter().map(|&i| fit.problem.images[i].name.clone()).collect()
     }
 
-    fn remedy(&self) -> String {
-        "fasten it and take the series again; if it is fast, look for a joint with play".into()
+    fn loose_mounting(&self, fit: &Fit, mounting: usize) -> LooseMounting {
+        LooseMounting {
+            mounting: fit.problem.mountings[mounting].clone(),
+            turn: TURNS[self.axis - 3],
+            angle_rad: self.distance,
+            spread_rad: self.spread,
+            images: self.names(fit),
+            of: self.of,
+        }
+    }
+
+    fn displaced(&self, fit: &Fit, step: &Step, mounting: usize, setting: &CheckContext) -> Displaced {
+        let first = self.smaller.first().map(|&i| &fit.problem.images[i]);
+        let is_carried = first.is_some_and(|image| image.mount == CameraMount::Fixed);
+        Displaced {
+            series: first.map_or_else(String::new, |image| setting.series[image.series].name.clone()),
+            body: if is_carried { Carried::PlateInHand } else { Carried::Plate },
+            places: Vec::new(),
+            mounting: fit.problem.mountings[mounting].clone(),
+            displacement: Displacement::ByTurns,
+            images: self.names(fit),
+            distance_m: step.size(0),
+            angle_rad: (step.change.len() > 3).then(|| step.size(3)),
+            share: self.share,
+            explains_most: true,
+            weight: Weight::Gate,
+        }
     }
 }
 

@@ -25,7 +25,7 @@ pub struct BodyMoved {
 }
 
 /// Changes between the two places beyond that of a move, or of one to and fro with a wrong image or two in between.
-const TURNS: usize = 6;
+pub(super) const CHANGES: usize = 6;
 
 /// What the wrongly paired images of a series agree on, for each mounting and placement.
 pub(super) fn check(Adjustment { problem, state }: &Adjustment, setting: &CheckContext) -> Vec<BodyMoved> {
@@ -60,7 +60,7 @@ fn stand_between(problem: &Problem, members: &[usize]) -> bool {
         (is_member || problem.images[i].rejected.is_none()).then_some(is_member)
     });
     let is_member: Vec<bool> = is_member.collect();
-    is_member.windows(2).filter(|two| two[0] != two[1]).count() >= TURNS
+    is_member.windows(2).filter(|two| two[0] != two[1]).count() >= CHANGES
 }
 
 impl BodyMoved {

@@ -19,13 +19,14 @@
 //! Several sockets may be on one fixture: likewise, about their middle along the axes of the base, where two of them at least hold the body on either side.
 //!
 //! Another focal length looks like a camera that moved along its axis, as far as all images are taken from one distance: where a step of it falls by
-//! more than that of plate or camera, it is named instead.
+//! more than that of plate or camera, it is named instead; and so is another principal point, as of pictures that are cut out elsewhere.
 
 use std::collections::BTreeSet;
 
 use super::displaced::{Carried, Displaced, Displacement};
 use super::finding::Finding;
 use super::focus::{self, FocusChange};
+use super::images_shifted::ImagesShifted;
 use super::kind::{CheckContext, Weight};
 use super::step_candidates::{Changed, Order, Shown};
 use super::step_rows::{Linear, Part, Step};
@@ -59,8 +60,8 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
         if log_chance > limits.displaced_false_alarms.ln() {
             break;
         }
-        if let Some(refocused) = linear.refocused(problem, &best, limits.displaced_images) {
-            best = refocused;
+        if let Some(otherwise) = linear.seen_otherwise(problem, &best, limits.displaced_images) {
+            best = otherwise;
         }
         let Some((next, step)) = linear.with(problem, &best) else { break };
         linear = next;
@@ -149,6 +150,7 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
         Order::Up(axis) => Displacement::AxisUp(axis),
         Order::Drift => Displacement::AllThrough,
         Order::Whole => Displacement::InAll,
+        Order::Turns => Displacement::ByTurns,
     };
     let images: Vec<String> = step.shown.iter().map(name).collect();
     let limits = setting.limits;
@@ -166,13 +168,10 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     if let Changed::Focal(camera) = step.changed {
         return refocused(step, fit, camera, images.into_iter().next()?, explains_most, setting);
     }
-    let sized = |from: usize| {
-        let axes = from..(from + 3).min(step.change.len());
-        let variance: f64 = axes.clone().map(|k| step.covariance[(k, k)]).sum();
-        let square: f64 = axes.map(|k| step.change[k].powi(2)).sum();
-        (square.sqrt(), (variance / 3.0).sqrt())
-    };
-    let (distance_m, angle_rad) = (sized(0), (step.change.len() > 3).then(|| sized(3)));
+    if let Changed::Centre(camera) = step.changed {
+        return Some(ImagesShifted::of(step, problem, camera, images).into());
+    }
+    let (distance_m, angle_rad) = (step.size(0), (step.change.len() > 3).then(|| step.size(3)));
     let matters = distance_m.0 > limits.displaced_m || angle_rad.is_some_and(|angle| angle.0 > limits.displaced_rad);
     let weight = weight(matters);
     let (body, mounting) = carried(step.changed, first, problem)?;

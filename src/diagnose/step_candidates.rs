@@ -27,6 +27,8 @@ pub(super) enum Changed {
     Zero(usize),
     /// The focal lengths of a camera.
     Focal(usize),
+    /// The principal point of a camera: its pictures are cut out elsewhere.
+    Centre(usize),
 }
 
 impl Changed {
@@ -44,6 +46,7 @@ impl Changed {
             Self::Bracket | Self::Fixture => 0..0,
             Self::Zero(reading) => zeros[reading].map_or(0..0, |c| c..c + 1),
             Self::Focal(c) => layout.cameras[c].start..layout.cameras[c].start + 2,
+            Self::Centre(c) => layout.cameras[c].start + 2..layout.cameras[c].start + 4,
         }
     }
 }
@@ -114,6 +117,8 @@ pub(super) enum Order {
     Drift,
     /// Not at all: another than in the other series.
     Whole,
+    /// By what was found of each: two places by turns.
+    Turns,
 }
 
 /// Something that was measured at a stop.
@@ -149,7 +154,7 @@ impl Shown {
             (_, Changed::Zero(_)) => true,
             (Self::Image { index, .. }, Changed::Placement(p)) => problem.images[index].placement == p,
             (Self::Image { index, .. }, Changed::Mounting(m)) => problem.images[index].mounting == m,
-            (Self::Image { index, .. }, Changed::Focal(c)) => problem.images[index].camera == c,
+            (Self::Image { index, .. }, Changed::Focal(c) | Changed::Centre(c)) => problem.images[index].camera == c,
             (Self::Measurement(k), Changed::Instrument(i)) => problem.body_measurements[k].instrument == i,
             (Self::Measurement(k), Changed::Target(b)) => problem.body_measurements[k].body == b,
             (Self::Measurement(k), Changed::Bracket) => is_by_tracker(problem, &problem.body_measurements[k]),

@@ -28,7 +28,7 @@ impl Linear {
             let mut divide = |order, rows: Vec<usize>| {
                 let rows = Rc::new(rows);
                 let (from, fewest) = match order {
-                    Order::Whole | Order::Drift => (0..1, 0),
+                    Order::Whole | Order::Drift | Order::Turns => (0..1, 0),
                     Order::Time | Order::Up(_) => (fewest..(rows.len() + 1).saturating_sub(fewest), fewest),
                 };
                 let is_tried =
@@ -70,14 +70,24 @@ impl Linear {
         fewest > 0 && before.iter().filter(is_on_both).count() > 1
     }
 
-    /// The change of focus that explains more than a plate or a camera that moved once, if there is one: beyond what noise lets it, as it is
-    /// told by the single images as well.
-    pub(super) fn refocused(&self, problem: &Problem, moved: &Step, fewest: usize) -> Option<Step> {
+    /// The change of focus, or of where pictures are cut out, that explains more than a plate or a camera that moved, if there is one: beyond what
+    /// noise lets it, as it is told by the single images as well.
+    pub(super) fn seen_otherwise(&self, problem: &Problem, moved: &Step, fewest: usize) -> Option<Step> {
         let is_body = matches!(moved.changed, Changed::Placement(_) | Changed::Mounting(_));
-        let first = moved.shown.first().filter(|_| is_body && moved.order == Order::Time)?;
-        let Shown::Image { index, .. } = *first else { return None };
-        let mut tried = self.divisions(problem, Changed::Focal(problem.images[index].camera), fewest);
-        tried.retain(|c| c.order == Order::Time && c.group == moved.group);
+        let Shown::Image { index, .. } = *moved.shown.first().filter(|_| is_body)? else { return None };
+        let camera = problem.images[index].camera;
+        let once = |changed| {
+            let mut tried = self.divisions(problem, changed, fewest);
+            tried.retain(|c| c.order == Order::Time && c.group == moved.group);
+            tried
+        };
+        let tried = match moved.order {
+            Order::Time => [Changed::Focal(camera), Changed::Centre(camera)].map(once).concat(),
+            // What moved once by much may creep, too, as far as one step from the fit tells.
+            Order::Drift => once(Changed::Centre(camera)),
+            Order::Turns => self.at(problem, Changed::Centre(camera), &moved.images()).into_iter().collect(),
+            Order::Up(_) | Order::Whole => return None,
+        };
         let mut step = self.most(problem, &tried)?;
         let by_chance = step.change.len() as f64;
         if step.fall - by_chance <= moved.fall {
@@ -86,6 +96,18 @@ impl Linear {
         // What the images tell by themselves is no part of the squares of the poses.
         (step.log_chance, step.fall) = (moved.log_chance, moved.fall);
         Some(step)
+    }
+
+    /// A change at these images and at no others.
+    pub(super) fn at(&self, problem: &Problem, changed: Changed, images: &[usize]) -> Option<Candidate> {
+        let is_moved = |shown: Shown| matches!(shown, Shown::Image { index, .. } if images.contains(&index));
+        let telling = (0..self.rows.len()).filter(|r| self.rows[*r].of(problem, changed).next().is_some());
+        let (moved, mut rows): (Vec<usize>, Vec<usize>) =
+            telling.partition(|r| self.rows[*r].of(problem, changed).any(is_moved));
+        let group = self.rows[*moved.first()?].group;
+        let from = rows.len();
+        rows.extend(moved);
+        Some(Candidate { changed, order: Order::Turns, group, rows: Rc::new(rows), from, fewest: 0 })
     }
 
     fn what_may_change(&self, problem: &Problem) -> Vec<Changed> {

@@ -99,6 +99,23 @@ pub(super) struct Step {
 }
 
 impl Step {
+    /// Images that it moves.
+    pub(super) fn images(&self) -> Vec<usize> {
+        let image = |shown: &Shown| match *shown {
+            Shown::Image { index, .. } => Some(index),
+            Shown::Measurement(_) => None,
+        };
+        self.shown.iter().filter_map(image).collect()
+    }
+
+    /// Length of three components of the change from one on, and its sigma per axis.
+    pub(super) fn size(&self, from: usize) -> (f64, f64) {
+        let axes = from..(from + 3).min(self.change.len());
+        let variance: f64 = axes.clone().map(|k| self.covariance[(k, k)]).sum();
+        let square: f64 = axes.map(|k| self.change[k].powi(2)).sum();
+        (square.sqrt(), (variance / 3.0).sqrt())
+    }
+
     /// False where what was found after it took its place: then it is less than noise alone makes of it.
     pub(super) fn still_counts(&self) -> bool {
         let squares = SymmetricFactor::new(&self.covariance).map(|factor| self.change.dot(&factor.solve(&self.change)));

@@ -8,12 +8,12 @@ use super::rows_of::rows_of_images;
 use super::start_verdict::{StartReached, StartVerdict};
 use super::suspects::{Suspects, best_scale, directions_alone, left_by_scale};
 use crate::assess::Limits;
-use crate::diagnose::{Finding, Mistake};
+use crate::diagnose::{Finding, Mistake, ReadingRatio};
 use crate::error::{Code, Error, Quantity, Result};
 use crate::fit::FreePoses;
 use crate::geom::log_so3;
 use crate::init::{
-    HandEye, HandEyeStart, PosePair, SeenStop, Zeros, hand_eye_misfit, shah, solve_hand_eye, solve_zeros,
+    HandEye, HandEyeStart, PosePair, SeenStop, Zeros, hand_eye_misfit, shah, solve_hand_eye, solve_slopes, solve_zeros,
 };
 use crate::linalg::median;
 use crate::linalg::symmetric_eigen;
@@ -163,7 +163,12 @@ fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
     };
     // Zeros alone are a matter of the fit as long as it starts.
     let is_needed = best.reversed.is_some() || as_described > limits.hand_eye_spread || look_like_lengths();
-    if !(is_far && explains && is_needed) {
+    // A reading that is wrong by a ratio looks like other zeros, as far as it stays on one side of its own.
+    let by_ratio = || {
+        let tried = solve_slopes(robot, &stops).and_then(|slopes| slopes.tried.into_iter().next());
+        tried.is_some_and(|slope| slope.left < limits.zeros_explain_share * best.left)
+    };
+    if !(is_far && explains && is_needed) || by_ratio() {
         return;
     }
     let mut chain = robot.chain.clone();
@@ -278,6 +283,9 @@ fn check_fit(suspects: &Suspects, misfit: f64, of: &str, how: &str) -> Result<()
         return Err(Finding::from(mistake).refusal());
     }
     if misfit > suspects.limits.hand_eye_spread {
+        if let Some(ratio) = ReadingRatio::of_misfit(suspects.robot, &suspects.stops(), misfit, suspects.limits) {
+            return Err(Finding::from(ratio).refusal());
+        }
         if let Some(broken) = broken(suspects, misfit, of) {
             return Err(broken);
         }

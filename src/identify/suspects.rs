@@ -129,21 +129,31 @@ impl Suspects<'_> {
             .collect()
     }
 
+    /// Its stops.
+    pub fn stops(&self) -> Vec<SeenStop> {
+        self.seen_with(&self.readings())
+    }
+
     pub(super) fn misfit(&self, readings: &[Vec<f64>]) -> f64 {
         self.misfit_with(readings, |stop| stop)
     }
 
     fn misfit_with(&self, readings: &[Vec<f64>], changed: impl Fn(SeenStop) -> SeenStop) -> f64 {
-        let stop = |((i, pair), readings): (&(usize, PosePair), &Vec<f64>)| {
-            let (readings, mount) = (readings.clone(), self.problem.images[*i].mount);
-            changed(SeenStop { readings, mount, camera_from_plate: pair.camera_from_plate })
-        };
-        let stops: Vec<SeenStop> = self.pairs.iter().zip(readings).map(stop).collect();
+        let stops: Vec<SeenStop> = self.seen_with(readings).into_iter().map(changed).collect();
         // Where bases were found from the readings as they are, they are found anew.
         let placed = bases::found(self.robot).and_then(|joint| bases::placed(self.robot, joint, &stops));
         let robot = placed.as_ref().unwrap_or(self.robot);
         let pairs: Vec<PosePair> = some_of(stops.len()).map(|k| stops[k].pair(robot)).collect();
         hand_eye_misfit(&pairs)
+    }
+
+    fn seen_with(&self, readings: &[Vec<f64>]) -> Vec<SeenStop> {
+        let stop = |((i, pair), readings): (&(usize, PosePair), &Vec<f64>)| SeenStop {
+            readings: readings.clone(),
+            mount: self.problem.images[*i].mount,
+            camera_from_plate: pair.camera_from_plate,
+        };
+        self.pairs.iter().zip(readings).map(stop).collect()
     }
 
     /// Camera in the hand and fixed camera exchanged.

@@ -62,7 +62,7 @@ fn placed(mounts: &[CameraMount], nominal: &Robot, k: usize) -> (Pose, Pose) {
     }
 }
 
-fn seen(mounts: &[CameraMount], wanted: usize, seed: u64) -> Seen {
+pub fn seen(mounts: &[CameraMount], wanted: usize, seed: u64) -> Seen {
     seen_displaced(mounts, wanted, seed, [0.0; 4])
 }
 

@@ -15,6 +15,7 @@ mod between_series;
 mod bodies;
 mod cameras;
 mod carried;
+mod causes;
 mod controller_poses;
 mod coverage;
 mod diagnosis;

@@ -1,0 +1,102 @@
+//! The finding that some pictures of a camera are cut out elsewhere than the others; [`super::pose_step`] and [`super::loose`] look for it.
+
+use super::displaced::Displaced;
+use super::focus::FocusChange;
+use super::kind::{Kind, Quantity, Subject, Weight, some_of};
+use super::step_candidates::Order;
+use super::step_rows::Step;
+use crate::error::Code;
+use crate::problem::Problem;
+
+/// Most images that are named.
+const MOST_IMAGES: usize = 5;
+
+/// Pictures whose content is shifted against that of the others of their camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImagesShifted {
+    /// Camera.
+    pub camera: String,
+    /// Names of its mountings in these images.
+    pub mountings: Vec<String>,
+    /// The images, in their order.
+    pub images: Vec<String>,
+    /// Whether others stand between them; else all from the first on are shifted.
+    pub by_turns: bool,
+    /// By how much to the right and downwards, px, each with its standard deviation.
+    pub shift_px: [(f64, f64); 2],
+    /// Gate, or a note where it explains little of the joint noise.
+    pub weight: Weight,
+}
+
+impl ImagesShifted {
+    /// Of a step of the principal point.
+    pub(super) fn of(step: &Step, problem: &Problem, camera: usize, images: Vec<String>) -> Self {
+        let mut mountings: Vec<String> =
+            step.images().iter().map(|i| problem.mountings[problem.images[*i].mounting].clone()).collect();
+        mountings.sort_unstable();
+        mountings.dedup();
+        Self {
+            camera: problem.cameras[camera].clone(),
+            mountings,
+            images,
+            by_turns: step.order == Order::Turns,
+            shift_px: [0, 1].map(|axis| (step.change[axis], step.covariance[(axis, axis)].sqrt())),
+            weight: if step.explains_most { Weight::Gate } else { Weight::Note },
+        }
+    }
+
+    /// True where plate or camera seem to stand elsewhere because of it.
+    pub(super) fn looks_like(&self, moved: &Displaced) -> bool {
+        self.weight == Weight::Gate && !moved.is_measured() && self.mountings.contains(&moved.mounting)
+    }
+
+    /// True where the camera on this mounting seems to have two places.
+    pub(super) fn explains_two_places_of(&self, mounting: &str) -> bool {
+        self.weight == Weight::Gate && self.mountings.iter().any(|own| own == mounting)
+    }
+
+    /// True where the focal length seems to be another because of it.
+    pub(super) fn explains_focus(&self, other: &FocusChange) -> bool {
+        self.weight == Weight::Gate && self.camera == other.camera
+    }
+}
+
+impl Kind for ImagesShifted {
+    fn code(&self) -> Code {
+        Code::ImagesShifted
+    }
+
+    fn weight(&self) -> Weight {
+        self.weight
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        let camera = Subject::Camera(self.camera.clone());
+        std::iter::once(camera).chain(self.images.iter().cloned().map(Subject::Image)).collect()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        let [u, v] = self.shift_px;
+        vec![Quantity::new("shift_u", u.0, "px").with_sigma(u.1), Quantity::new("shift_v", v.0, "px").with_sigma(v.1)]
+    }
+
+    fn place(&self) -> String {
+        format!("camera {}", self.camera)
+    }
+
+    fn seen(&self) -> String {
+        let [(u, u_sigma), (v, v_sigma)] = self.shift_px;
+        let first = self.images.first().map_or("", String::as_str);
+        let which = match self.by_turns {
+            true => format!("{} of its images ({})", self.images.len(), some_of(&self.images, MOST_IMAGES)),
+            false => format!("its images from {first} on"),
+        };
+        format!(
+            "{which} are shifted by {u:+.2} px in u and {v:+.2} px in v (sigma {u_sigma:.2} and {v_sigma:.2}) against the others: the region that is read from the sensor, or the crop, was changed"
+        )
+    }
+
+    fn remedy(&self) -> String {
+        "read all images with one region, or shift these back; or put them into a series of their own with another [camera] name".into()
+    }
+}

@@ -1,0 +1,58 @@
+//! The finding that a camera sits loosely on its mount; [`super::loose`] looks for it.
+
+use super::kind::{Kind, Quantity, Subject, some_of};
+use crate::error::Code;
+
+/// Most images that are named.
+const MOST_IMAGES: usize = 5;
+
+/// A camera tips over between two positions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LooseMounting {
+    /// Name of the mounting.
+    pub mounting: String,
+    /// About which axis of the camera: pitch, yaw, roll.
+    pub turn: &'static str,
+    /// Angle between the positions, rad.
+    pub angle_rad: f64,
+    /// Spread of either, rad.
+    pub spread_rad: f64,
+    /// Images in the rarer position.
+    pub images: Vec<String>,
+    /// Images in all.
+    pub of: usize,
+}
+
+impl Kind for LooseMounting {
+    fn code(&self) -> Code {
+        Code::LooseMounting
+    }
+
+    fn subjects(&self) -> Vec<Subject> {
+        let body = Subject::Body(self.mounting.clone());
+        std::iter::once(body).chain(self.images.iter().cloned().map(Subject::Image)).collect()
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        vec![Quantity::new("angle", self.angle_rad, "rad").with_sigma(self.spread_rad)]
+    }
+
+    fn place(&self) -> String {
+        format!("camera mount {}", self.mounting)
+    }
+
+    fn seen(&self) -> String {
+        format!(
+            "the {} of the camera has two values {:.2} mrad apart ({} of {} images: {}): it is loose on its mount or slips, or a joint has backlash",
+            self.turn,
+            1e3 * self.angle_rad,
+            self.images.len(),
+            self.of,
+            some_of(&self.images, MOST_IMAGES)
+        )
+    }
+
+    fn remedy(&self) -> String {
+        "fasten it and take the series again; if it is fast, look for a joint with play".into()
+    }
+}
