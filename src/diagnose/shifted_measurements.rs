@@ -72,10 +72,9 @@ impl Group<'_> {
         let problem = &self.adjustment.problem;
         let used = (0..self.group.len()).filter(|row| self.measured(*row).rejected.is_none());
         let usual = median(used.filter_map(|row| self.misfit(row, self.measured(row).stop)))?;
-        let mut own: Vec<usize> = (0..self.group.len()).map(|row| self.measured(row).stop).collect();
-        own.dedup();
-        let all: Vec<usize> = (0..problem.stops.len()).collect();
-        let ways = [&all, &own].into_iter().flat_map(|order| [true, false].map(|below| (order, below)));
+        let own: Vec<usize> = (0..self.group.len()).map(|row| self.measured(row).stop).collect();
+        let orders = problem.orders_of_rows(&own);
+        let ways = orders.iter().flat_map(|order| [true, false].map(|below| (order, below)));
         ways.filter_map(|(order, below)| self.run(order, below, usual, setting)).max_by_key(|found| found.rows)
     }
 
@@ -112,10 +111,8 @@ impl Group<'_> {
         let measured = self.measured(row);
         let is_out =
             matches!(measured.rejected, Some(BodyRejection::Residual { .. } | BodyRejection::JointError { .. }));
-        let at = order.binary_search(&measured.stop).ok().filter(|_| is_out)?;
-        let other = *order.get(if below { at + 1 } else { at.checked_sub(1)? })?;
-        let is_near = problem.stops[other].series == problem.stops[measured.stop].series;
-        let (own, as_other) = (self.misfit(row, measured.stop)?, self.misfit(row, other).filter(|_| is_near)?);
+        let other = problem.neighbour(order, measured.stop, below).filter(|_| is_out)?;
+        let (own, as_other) = (self.misfit(row, measured.stop)?, self.misfit(row, other)?);
         (as_other < usual + limits.other_readings_explain * own).then_some(as_other)
     }
 }

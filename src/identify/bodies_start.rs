@@ -11,15 +11,14 @@ use super::body_misfit::{FEWEST_POSES, usual_misfit};
 use super::body_mistakes::name_mistake;
 use super::body_placed::{SeenFrom, missed, pairs, placed};
 use super::places_exchanged::name_exchange;
-use super::points_start::{DISAGREES, FEWEST_POINTS, HOLD, Placed, TRIMMINGS, lower_median, once, posture, tip_at};
+use super::points_start::{DISAGREES, FEWEST_POINTS, HOLD, Placed, TRIMMINGS, once, posture, tip_at};
 use super::repeated_rows::leave_out_repeated;
 use super::rows_in_part::name_part;
 use super::unrelated_rows::name_unrelated;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
-use crate::linalg::SymmetricFactor;
-use crate::linalg::median;
+use crate::linalg::{SymmetricFactor, lower_median, median};
 use crate::problem::{Adjustment, BodyRejection, InstrumentKind, MeasuredSeries, Problem};
 
 /// Fills in instruments and bodies.
@@ -65,7 +64,7 @@ fn leave_out_others(adjustment: &mut Adjustment, measured: &[usize], placed: &Pl
         Some((k, missed(&(measured.seen, tip_at(adjustment, measured)?), placed)))
     };
     let all: Vec<(usize, f64)> = measured.iter().filter_map(seen).collect();
-    let usual = lower_median(all.iter().map(|(_, distance)| *distance).collect());
+    let usual = lower_median(all.iter().map(|(_, distance)| *distance));
     let bound = f64::max(limits.suspicious_misfit, DISAGREES * usual);
     leave_far_out(&mut adjustment.problem, all.into_iter(), bound, limits);
 }

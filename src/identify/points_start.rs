@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::parts::ends_of_parts;
 use crate::geom::{Pose, project_to_so3};
-use crate::linalg::SymmetricFactor;
+use crate::linalg::{SymmetricFactor, lower_median};
 use crate::problem::{Adjustment, BodyMeasurement};
 
 /// A point in the frame of its instrument, and the pose of the tip.
@@ -93,12 +93,6 @@ pub(super) fn distances(points: &[PointAt], (frame, body): &Placed) -> Vec<f64> 
 /// The median of these.
 pub(super) fn usual_distance(points: &[PointAt], placed: &Placed) -> f64 {
     lower_median(distances(points, placed))
-}
-
-/// The middle value, of an even number the smaller of both: half of them are as small. Infinite where there is none.
-pub(super) fn lower_median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len().saturating_sub(1) / 2).copied().unwrap_or(f64::INFINITY)
 }
 
 /// Frame and body that most of the points fit, every posture counting once.

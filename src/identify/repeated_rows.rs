@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::body_placed::{SeenFrom, missed, placed};
-use super::points_start::{DISAGREES, Placed, lower_median, tip_at};
+use super::points_start::{DISAGREES, Placed, tip_at};
 use crate::assess::Limits;
 use crate::geom::Pose;
+use crate::linalg::lower_median;
 use crate::problem::{Adjustment, BodyRejection, BodySeen, InstrumentKind, Problem};
 
 /// Leaves out what was written again at successive stops of a series, where the others say that the target was carried further than they miss by, and
@@ -40,7 +41,7 @@ fn stuck(adjustment: &Adjustment, group: &[usize], limits: &Limits) -> Vec<usize
         return Vec::new();
     }
     let Some(placed) = placed(&others, limits.suspicious_misfit) else { return Vec::new() };
-    let usual = lower_median(others.iter().map(|seen| missed(seen, &placed)).collect());
+    let usual = lower_median(others.iter().map(|seen| missed(seen, &placed)));
     let bound = f64::max(limits.suspicious_misfit, DISAGREES * usual);
     let fits = |row: &Row| missed(&row.1, &placed) <= bound;
     let is_stuck = |at: &usize| {

@@ -9,12 +9,13 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::body_placed::{SeenFrom, missed, pairs, placed, points};
-use super::points_start::{MANY_POINTS, Placed, lower_median, roughly};
+use super::points_start::{MANY_POINTS, Placed, roughly};
 use super::rows_of::rows_of_bodies;
 use super::suspects::ENOUGH;
 use crate::assess::{Limits, best_run};
 use crate::diagnose::{Finding, Mistake, MistakeKind, ShiftedPart};
 use crate::error::Result;
+use crate::linalg::lower_median;
 use crate::problem::{Adjustment, InstrumentKind, MeasuredSeries, Problem, stop_name};
 use crate::series::spread;
 
@@ -60,7 +61,7 @@ pub(super) fn name_part(
     let tried = neighbours(problem, &rows).into_iter().filter_map(read);
     let Some((part, below)) = tried.min_by(|a, b| a.0.missed.cmp(&b.0.missed)) else { return Ok(()) };
     let others = |k: &usize| !part.rows.contains(k);
-    let of_others = lower_median((0..own.len()).filter(others).map(|k| misfits[k]).collect());
+    let of_others = lower_median((0..own.len()).filter(others).map(|k| misfits[k]));
     if part.others_missed as f64 <= limits.share_of_images_left_out * own.len() as f64 && of_others < bound {
         // They are left out like single rows, and named by the fit.
         return Ok(());
@@ -87,17 +88,11 @@ pub(super) fn name_part(
 /// For each row the stop of the next one, or the one before, in its series: of all stops, and of those that were measured.
 fn neighbours(problem: &Problem, rows: &[usize]) -> Vec<(Vec<Option<usize>>, bool)> {
     let own: Vec<usize> = rows.iter().map(|k| problem.body_measurements[*k].stop).collect();
-    let all: Vec<usize> = (0..problem.stops.len()).collect();
-    let mut measured = own.clone();
-    measured.dedup();
-    let orders = if measured.len() < all.len() { vec![all, measured] } else { vec![all] };
-    let of = |order: &[usize], below: bool, stop: usize| {
-        let at = order.binary_search(&stop).ok()?;
-        let other = *order.get(if below { at + 1 } else { at.checked_sub(1)? })?;
-        (problem.stops[other].series == problem.stops[stop].series).then_some(other)
-    };
+    let orders = problem.orders_of_rows(&own);
     let shifts = orders.iter().flat_map(|order| [true, false].map(|below| (order, below)));
-    shifts.map(|(order, below)| (own.iter().map(|stop| of(order, below, *stop)).collect(), below)).collect()
+    shifts
+        .map(|(order, below)| (own.iter().map(|stop| problem.neighbour(order, *stop, below)).collect(), below))
+        .collect()
 }
 
 /// What was seen with the readings of its own row, and with those of a neighbour where there is one.
@@ -162,7 +157,7 @@ impl Read<'_> {
     /// The part, where most rows fit by it, those outside as they stand.
     fn part(&self, misfits: &[f64], limits: &Limits) -> Option<Part> {
         let bound = limits.suspicious_misfit;
-        let most = f64::max(bound, limits.mistake_explains * lower_median(misfits.to_vec()));
+        let most = f64::max(bound, limits.mistake_explains * lower_median(misfits.iter().copied()));
         let refined = |division: Range<usize>| {
             let mut rows = division;
             let mut found = None;
@@ -170,7 +165,7 @@ impl Read<'_> {
                 let taken = self.taken(&rows, ENOUGH);
                 // Parts of these were tried before.
                 let by = placed(&taken, f64::INFINITY)?;
-                if lower_median(taken.iter().map(|seen| missed(seen, &by)).collect()) > bound {
+                if lower_median(taken.iter().map(|seen| missed(seen, &by))) > bound {
                     return None;
                 }
                 rows = self.run(&by, bound).0;
@@ -202,7 +197,7 @@ impl Read<'_> {
         let explains = (n - fitting) as f64 <= limits.share_of_images_left_out * n as f64;
         let is_part = others_missed >= limits.moved_images && as_they_stand >= limits.moved_images;
         let read = |k: usize| if rows.contains(&k) { other[k] } else { own[k] };
-        let misfit = lower_median((0..n).map(read).collect());
+        let misfit = lower_median((0..n).map(read));
         (explains && is_part && 2 * in_part > rows.len()).then_some(Part {
             missed: n - fitting,
             others_missed,

@@ -2,9 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::points_start::{FEWEST_POINTS, Placed, PointAt, distances, lower_median, point_at};
+use super::points_start::{FEWEST_POINTS, Placed, PointAt, distances, point_at};
 use crate::assess::Limits;
 use crate::error::{Code, Error, Quantity, Result};
+use crate::linalg::lower_median;
 use crate::problem::{Adjustment, InstrumentKind};
 
 /// Refuses measurements that miss where the tip carries the body by as much as they lie apart, where no usual mistake explains it: of rows without any
@@ -28,7 +29,7 @@ pub(super) fn name_unrelated(
     }
     let misfit = lower_median(distances(&points, placed));
     let middle = points.iter().map(|(at, _)| at).sum::<Vector3<f64>>() / points.len() as f64;
-    let apart = lower_median(points.iter().map(|(at, _)| (at - middle).norm()).collect());
+    let apart = lower_median(points.iter().map(|(at, _)| (at - middle).norm()));
     if misfit < limits.suspicious_misfit || misfit < 0.5 * apart {
         return Ok(());
     }

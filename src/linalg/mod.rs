@@ -7,7 +7,7 @@ mod median;
 mod quadratic;
 mod wide;
 
-pub use median::{median, median_by};
+pub use median::{lower_median, median, median_by};
 pub use quadratic::{LinearRow, NotSolved, minimise_quadratic};
 pub use wide::{add_combination, sum_of_products, wide};
 

@@ -17,6 +17,7 @@ mod length;
 mod linearise;
 mod measured;
 mod measured_series;
+mod neighbours;
 mod noise;
 mod plate_distance;
 mod plate_shape;

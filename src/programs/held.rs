@@ -40,6 +40,16 @@ impl<V: Clone + PartialEq> Held<V> {
         Self { passed: self.passed.with(&end.passed), ..last.clone() }
     }
 
+    /// Notes what another has passed through.
+    pub fn note(&mut self, other: &Self) {
+        self.passed = self.passed.with(&other.passed);
+    }
+
+    /// What the routine, and those that it has called, have set it to, each value once.
+    pub fn passed(&self) -> &[V] {
+        &self.passed.values
+    }
+
     /// The same where a routine that ends so may have been left at any statement, or goes on beside the text.
     pub fn or_passed_by(&mut self, end: &Self, differing: impl Fn(&V, &V) -> V) {
         for passed in &end.passed.values {

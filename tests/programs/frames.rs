@@ -21,8 +21,9 @@ use robotcal::output::work_findings::from_below;
 use robotcal::simulate::truth::Truth;
 
 use crate::programs_support::touching::{Toucher, ranges, spread, write};
-use crate::programs_support::{Run, findings, repo};
+use crate::programs_support::{Run, findings};
 use crate::robots::KR6;
+use crate::robots::repo;
 use crate::said::assert_says;
 
 const TOOL: [f64; 3] = [0.012, -0.02, 0.11];

@@ -22,9 +22,9 @@ use robotcal::simulate::{RobotErrors, WorldRequest, series};
 use robotcal::study::measured;
 use robotcal::urdf::{Chain, read};
 
-use crate::programs_support::repo;
 use crate::programs_support::touching::{Toucher, ranges, spread};
 use crate::robots::kr6_urdf;
+use crate::robots::repo;
 
 /// Sigma of a touch per axis, m.
 const TOUCH_M: f64 = 5e-5;

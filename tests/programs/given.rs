@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::programs_support::{Cell, Run, findings, repo};
+use crate::programs_support::{Cell, Run, findings};
+use crate::robots::repo;
 use robotcal::Code;
 
 /// `compensate` with these descriptions, base and tool nominal.

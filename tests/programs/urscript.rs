@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use crate::programs_support::findings;
 use crate::programs_support::{Cell, assert_meets, numbers, shape};
+use crate::robots::repo;
 use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::geom::{Pose, exp_so3};
@@ -235,7 +236,7 @@ fn a_program_moves_from_one_calibrated_robot_to_another() {
 
 #[test]
 fn redundant_axes_stay_close_and_held_ones_stay() {
-    let urdf = crate::programs_support::repo("robots/lbr_iiwa_14/lbr_iiwa_14.urdf");
+    let urdf = repo("robots/lbr_iiwa_14/lbr_iiwa_14.urdf");
     let mut cell = Cell::new(&urdf, ("base_link", "flange"), 9);
     let table: Vec<Vec<f64>> = (0..50).map(|_| cell.readings_holding(Some(2))).collect();
     let text = csv(&cell.nominal.chain.readings.join(","), &table);
@@ -632,8 +633,8 @@ fn the_controller_may_compute_in_a_frame_that_is_fixed_beside_the_arm() {
 /// The world behind reports/kr6_small is known: what is left in its base frame against what is promised.
 #[test]
 fn what_base_and_tool_leave_is_stated_by_the_covariance_of_the_solution() {
-    let report = crate::programs_support::repo("reports/kr6_small");
-    let truth = std::fs::read_to_string(crate::programs_support::repo("datasets/kr6_small/truth.toml")).unwrap();
+    let report = repo("reports/kr6_small");
+    let truth = std::fs::read_to_string(repo("datasets/kr6_small/truth.toml")).unwrap();
     let truth: toml::Value = toml::from_str(&truth).unwrap();
     let list = |v: &toml::Value| -> Vec<f64> { v.as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect() };
     let known: Vec<(Vec<f64>, Pose)> = truth["held_out"]

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use crate::robots::kr6_urdf;
+use crate::robots::{kr6_urdf, repo};
 use nalgebra::Vector6;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -30,10 +30,6 @@ pub struct Cell {
     /// Read back from the files by this crate's readers of URDF; terms as drawn.
     pub real: Robot,
     pub rng: ChaCha8Rng,
-}
-
-pub fn repo(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
 fn chain(urdf: &Path, links: (&str, &str)) -> Chain {

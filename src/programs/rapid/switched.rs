@@ -46,20 +46,16 @@ impl Either for BTreeSet<String> {
 
 /// One thing that instructions switch.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Switch<V> {
-    held: Held<V>,
-    /// What the routine, and those that it has called, have switched it to at one time or another; `None` where they have not.
-    passed: Option<V>,
-}
+pub(super) struct Switch<V>(Held<V>);
 
 impl<V: Either + Clone + PartialEq> Switch<V> {
     fn new(value: V) -> Self {
-        Self { held: Held::new(value), passed: None }
+        Self(Held::new(value))
     }
 
     /// What holds.
     pub fn value(&self) -> &V {
-        &self.held.value
+        &self.0.value
     }
 
     /// What holds where the text begins.
@@ -69,49 +65,44 @@ impl<V: Either + Clone + PartialEq> Switch<V> {
 
     /// An instruction switches it.
     pub fn set(&mut self, value: V) {
-        self.passed = either(self.passed.as_ref(), Some(&value));
-        self.held.set(value);
+        self.0.set(value);
     }
 
     /// Notes what another has passed through.
     fn note(&mut self, other: &Self) {
-        self.passed = either(self.passed.as_ref(), other.passed.as_ref());
+        self.0.note(&other.0);
+    }
+
+    /// What the routine, and those that it has called, have switched it to at one time or another; `None` where they have not.
+    fn passed(&self) -> Option<V> {
+        self.0.passed().iter().cloned().reduce(|one, other| one.either(&other))
     }
 
     /// The same where any statement of the routine may have been the last one: it began with `top`, which has noted all that it passed through.
     fn anywhere(mut self, top: &Self) -> Self {
-        if let Some(passed) = &top.passed {
-            self.held.set(self.value().either(passed).either(top.value()));
+        if let Some(passed) = top.passed() {
+            self.set(self.value().either(&passed).either(top.value()));
         }
         self
     }
 
     /// The same where a routine that ends so may have been left at any of its statements.
     fn or_left_by(&mut self, end: &Self) {
-        if let Some(passed) = &end.passed {
-            self.set(self.value().either(passed));
+        if let Some(passed) = end.passed() {
+            self.set(self.value().either(&passed));
         }
     }
 
     fn merged(&self, other: &Self) -> Self {
-        let passed = either(self.passed.as_ref(), other.passed.as_ref());
-        Self { held: self.held.merged(&other.held, V::either), passed }
+        Self(self.0.merged(&other.0, V::either))
     }
 
     fn at_top(&self) -> Self {
-        Self { held: self.held.at_top(), passed: None }
+        Self(self.0.at_top())
     }
 
     fn behind_call(&self, end: &Self) -> Self {
-        let passed = either(self.passed.as_ref(), end.passed.as_ref());
-        Self { held: self.held.behind_call(&end.held), passed }
-    }
-}
-
-fn either<V: Either + Clone>(one: Option<&V>, other: Option<&V>) -> Option<V> {
-    match (one, other) {
-        (Some(one), Some(other)) => Some(one.either(other)),
-        (one, other) => one.or(other).cloned(),
+        Self(self.0.behind_call(&end.0))
     }
 }
 
