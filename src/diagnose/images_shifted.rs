@@ -22,8 +22,8 @@ pub struct ImagesShifted {
     pub images: Vec<String>,
     /// Whether others stand between them; else all from the first on are shifted.
     pub by_turns: bool,
-    /// By how much to the right and downwards, px, each with its standard deviation.
-    pub shift_px: [(f64, f64); 2],
+    /// By how much to the right and downwards, px: at least, as the fit has taken a part of it.
+    pub shift_px: [f64; 2],
     /// Gate, or a note where it explains little of the joint noise.
     pub weight: Weight,
 }
@@ -40,7 +40,7 @@ impl ImagesShifted {
             mountings,
             images,
             by_turns: step.order == Order::Turns,
-            shift_px: [0, 1].map(|axis| (step.change[axis], step.covariance[(axis, axis)].sqrt())),
+            shift_px: [0, 1].map(|axis| step.change[axis]),
             weight: if step.explains_most { Weight::Gate } else { Weight::Note },
         }
     }
@@ -77,7 +77,7 @@ impl Kind for ImagesShifted {
 
     fn quantities(&self) -> Vec<Quantity> {
         let [u, v] = self.shift_px;
-        vec![Quantity::new("shift_u", u.0, "px").with_sigma(u.1), Quantity::new("shift_v", v.0, "px").with_sigma(v.1)]
+        vec![Quantity::new("shift_u", u, "px"), Quantity::new("shift_v", v, "px")]
     }
 
     fn place(&self) -> String {
@@ -85,18 +85,18 @@ impl Kind for ImagesShifted {
     }
 
     fn seen(&self) -> String {
-        let [(u, u_sigma), (v, v_sigma)] = self.shift_px;
+        let [u, v] = self.shift_px;
         let first = self.images.first().map_or("", String::as_str);
         let which = match self.by_turns {
             true => format!("{} of its images ({})", self.images.len(), some_of(&self.images, MOST_IMAGES)),
             false => format!("its images from {first} on"),
         };
         format!(
-            "{which} are shifted by {u:+.2} px in u and {v:+.2} px in v (sigma {u_sigma:.2} and {v_sigma:.2}) against the others: the region that is read from the sensor, or the crop, was changed"
+            "{which} are shifted against the others, by {u:+.1} px in u and {v:+.1} px in v or more: the region that is read from the sensor, or the crop, was changed"
         )
     }
 
     fn remedy(&self) -> String {
-        "read all images with one region, or shift these back; or put them into a series of their own with another [camera] name".into()
+        "read all images with one region, or put them into a series of their own with another [camera] name".into()
     }
 }

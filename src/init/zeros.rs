@@ -7,8 +7,8 @@
 //!
 //! In the same way a reading `q_k` is taken as `q_k + o_k + f q_j`: with `k = j` a joint that moves by `1 + f` times its reading, else one that another
 //! moves with it. Errors of the origins are as large as what a ratio that is off by a percent leaves in doubt: of the pair that leaves least, `f` is found once
-//! more beside twists `xi` of all origins with their priors, by one generalised least-squares step `(A / s^2 + P) d = b / s^2 - P x`, whose size
-//! `s^2 = sum r^2 / (n - tr((A / s^2 + P)^-1 A / s^2))` is found with it.
+//! more beside twists `xi` of all origins with their priors, by generalised least-squares steps `(A / s^2 + P) d = b / s^2 - P x`, whose size
+//! `s^2 = sum r^2 / (n - tr((A / s^2 + P)^-1 A / s^2))` is found with them.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
@@ -198,33 +198,38 @@ impl Trial<'_> {
     /// The slope and its standard deviation beside errors of all origins, from where other zeros alone lead.
     fn beside_origins(&self, x: &Unknowns) -> Option<(f64, f64)> {
         let usual = self.left(x);
-        let own = self.stops.iter().filter(|s| size(&self.misfit(s, x).0) <= FAR * usual);
-        let rows: Vec<(Vector6<f64>, DMatrix<f64>)> = own.map(|s| self.misfit_by_origins(s, x)).collect();
-        let (first, count) = (self.unknowns(x), rows.first()?.1.ncols());
-        let (mut a, mut b, mut square) = (DMatrix::zeros(count, count), DVector::zeros(count), 0.0);
-        for (r, j) in &rows {
-            a += j.tr_mul(j);
-            b -= j.tr_mul(r);
-            square += r.norm_squared();
-        }
-        let (mut prior, mut pull) = (DVector::zeros(count), DVector::zeros(count));
-        for (k, offset) in x.offsets.iter().enumerate() {
-            prior[12 + k] = OFFSET.powi(-2);
-            pull[12 + k] = -offset * OFFSET.powi(-2);
-        }
+        let own: Vec<&SeenStop> = self.stops.iter().filter(|s| size(&self.misfit(s, x).0) <= FAR * usual).collect();
+        let values = 6.0 * own.len() as f64;
+        let (mut robot, mut x) = (self.robot.clone(), x.clone());
+        let first = self.unknowns(&x);
+        let count = first + 6 * robot.twists.len();
+        let mut prior = DVector::zeros(count);
+        (12..first - 1).for_each(|k| prior[k] = OFFSET.powi(-2));
         (first..count).for_each(|k| prior[k] = ORIGIN[(k - first) / 3 % 2].powi(-2));
-        let values = 6.0 * rows.len() as f64;
-        let mut variance = square / values;
-        let mut told = None;
+        let (mut variance, mut told) = (None, None);
         for _ in 0..ROUNDS {
-            let information = &a / variance + DMatrix::from_diagonal(&prior);
+            let trial = Trial { robot: &robot, ..*self };
+            let (mut a, mut b, mut square) = (DMatrix::zeros(count, count), DVector::zeros(count), 0.0);
+            for (r, j) in own.iter().map(|stop| trial.misfit_by_origins(stop, &x)) {
+                a += j.tr_mul(&j);
+                b -= j.tr_mul(&r);
+                square += r.norm_squared();
+            }
+            let usual = *variance.get_or_insert(square / values);
+            let mut held = DVector::zeros(count);
+            x.offsets.iter().enumerate().for_each(|(k, offset)| held[12 + k] = *offset);
+            robot.twists.iter().enumerate().for_each(|(k, xi)| held.rows_mut(first + 6 * k, 6).copy_from(xi));
+            let information = &a / usual + DMatrix::from_diagonal(&prior);
             let factor = SymmetricFactor::new(&information).ok()?;
-            let step = factor.solve(&(&b / variance + &pull));
+            let step = factor.solve(&(&b / usual - prior.component_mul(&held)));
             let inverse = factor.inverse();
-            let taken = inverse.component_mul(&a).sum() / variance;
+            let taken = inverse.component_mul(&a).sum() / usual;
             let left = square - 2.0 * step.dot(&b) + step.dot(&(&a * &step));
-            told = Some((x.part + step[first - 1], inverse[(first - 1, first - 1)].sqrt()));
-            variance = (left.max(0.0) / (values - taken).max(1.0)).max(f64::EPSILON.powi(2));
+            variance = Some((left.max(0.0) / (values - taken).max(1.0)).max(f64::EPSILON.powi(2)));
+            x = x.moved(&step.rows(0, first).into_owned());
+            let twists = robot.twists.iter_mut().enumerate();
+            twists.for_each(|(k, xi)| *xi += step.fixed_rows::<6>(first + 6 * k));
+            told = Some((x.part, inverse[(first - 1, first - 1)].sqrt()));
         }
         told
     }
