@@ -2,84 +2,50 @@
 //!
 //! Exporters are pure: [`each_file`] and [`stand_alone_files`] make every file of a result in memory (for small pictures in the report they look at images of the series),
 //! [`ResultFolder`] alone writes.
-//! A new exporter is one file here and one row in [`each_file`].
+//! A new exporter is one file in the folder of its subject and one row in [`each_file`].
+//!
+//! `vision` holds what images tell, `solution` the records of solution.json, `robot` the corrected robot, `judgement` what all that is worth; `frames` and
+//! `plan` are results of other commands. `report` and `drawing` show them, `camera_formats` speaks the formats of other programs, `write` puts files on the disk.
+//! Beside them stands what many need: names, numbers as text, matrices, the frames of plates.
 
-mod bodies_record;
-mod camera_file;
 pub mod camera_formats;
-#[cfg(feature = "draw")]
-mod canvas;
-pub mod comparison;
-mod compensation;
-mod compensation_read;
 mod context;
-mod controller_files;
-pub mod corrections;
-pub mod detection_files;
-pub mod difference;
 #[cfg(feature = "draw")]
-mod dot_font;
-mod estimates;
-mod finding_record;
+mod drawing;
 pub mod flange_table;
-pub mod frame_files;
-pub mod frame_findings;
-pub mod frames_record;
+mod frames;
 mod gauge;
-mod image_records;
-mod kinematics_file;
-mod mastering;
+mod judgement;
 mod names;
 mod npy;
-mod observation_table;
-#[cfg(feature = "draw")]
-pub mod overlay;
-pub mod parameter_words;
-pub mod photogrammetry;
-pub mod plan_files;
-pub mod plan_programs;
-pub mod plan_start;
-#[cfg(feature = "draw")]
-pub mod plate_drawing;
-mod plate_files;
-#[cfg(feature = "draw")]
-mod plate_pdf;
-#[cfg(feature = "draw")]
-mod plate_png;
-#[cfg(feature = "draw")]
-mod plate_svg;
-mod pose_files;
-mod pose_record;
-pub mod poses_record;
-#[cfg(feature = "mcap")]
-pub mod recording;
+mod plan;
 #[cfg(feature = "report")]
 pub(crate) mod report;
-mod residuals;
-pub mod restore;
-mod robot_files;
-mod series_record;
-mod solution_bytes;
-mod solution_check;
-pub mod solution_json;
-mod solution_record;
-pub mod stand_alone_files;
+mod robot;
+mod solution;
 mod text;
-mod ur_frames;
-pub mod verdict;
-pub mod work_findings;
+mod vision;
 mod write;
 
-pub use compensation_read::{compensated, parse_compensation, read_compensation};
 pub use context::{Context, Offsets, Poses};
-pub use controller_files::kinematics_xacro;
-pub use kinematics_file::kinematics_yaml;
+#[cfg(feature = "draw")]
+pub use drawing::{overlay, plate_drawing};
+pub use frames::{frame_files, frame_findings, frames_record, work_findings};
+pub use judgement::{comparison, corrections, difference, parameter_words, verdict};
 pub use names::folder_name;
+pub use plan::{plan_files, plan_programs, plan_start};
 #[cfg(feature = "report")]
 pub use report::{
     FILE_NAME as REPORT, FigureFile, Shown, Thumbnail, Thumbnails, figure_files, plan_html, report_html, sigma_text,
 };
-pub use robot_files::{ALONE, CALIBRATED};
+pub use robot::compensation_read::{compensated, parse_compensation, read_compensation};
+pub use robot::controller_files::kinematics_xacro;
+pub use robot::corrected_robot::{ALONE, CALIBRATED};
+pub use robot::kinematics_file::kinematics_yaml;
+pub use solution::{photogrammetry, restore, solution_json};
+#[cfg(feature = "mcap")]
+pub use vision::recording;
+pub use vision::{detection_files, poses_record, stand_alone_files};
 pub use write::{NewFolder, NewResult, ResultFolder, recover, write_all, write_beside};
 
 use std::collections::BTreeMap;
@@ -87,6 +53,9 @@ use std::collections::BTreeMap;
 use crate::error::Result;
 use crate::identify::{Solution, depths_m};
 use crate::problem::Adjustment;
+use robot::corrected_robot;
+use solution::solution_record;
+use vision::{camera_file, observation_table, plate_files, pose_files};
 
 /// Every file of the result: name -> bytes.
 ///
@@ -122,7 +91,9 @@ pub fn each_file(
     };
     // Poses of a controller tell nothing of its robot.
     if state.robot.chain.pose_coordinates().is_none() {
-        robot_files::all(solution, context)?.into_iter().try_for_each(|(name, text)| add(name, text.into_bytes()))?;
+        corrected_robot::all(solution, context)?
+            .into_iter()
+            .try_for_each(|(name, text)| add(name, text.into_bytes()))?;
     }
     let images = names::ImageNames::new(problem, &context.series);
     let texts = (camera_file::cameras(&problem.cameras, &state.cameras, &depths).into_iter())

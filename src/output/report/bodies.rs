@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::words::{count, significant};
-use crate::output::bodies_record::{BodiesRecord, MeasurementRecord};
+use crate::output::solution::bodies_record::{BodiesRecord, MeasurementRecord};
 use crate::output::solution_json::SolutionRecord;
 use crate::problem::InstrumentKind;
 

@@ -1,0 +1,110 @@
+//! What is to be said of measured frames.
+
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
+
+use crate::assess::Limits;
+use crate::diagnose::{Finding, Mistake, Weight};
+use crate::error::Code;
+use crate::frames::{FrameFit, Touches};
+use crate::geom::{Pose, adjoint};
+use crate::output::corrections::{FileFinding, numbers};
+
+/// Stops that are named.
+const NAMED: usize = 5;
+
+/// Findings of a fit of tool and work object, and of the mistake that explains why it is bad; `subject` is the file of the touches.
+pub fn frame_findings(
+    (fit, mistake): (&FrameFit, Option<Mistake>),
+    touches: &Touches,
+    limits: &Limits,
+    subject: &str,
+) -> Vec<FileFinding> {
+    let finding =
+        |code, weight, quantities, text| FileFinding { code, weight, subject: subject.to_owned(), quantities, text };
+    if let Some(mistake) = mistake {
+        let (rms, undone) = (1e3 * mistake.misfit, 1e3 * mistake.misfit_undone.unwrap_or_default());
+        let quantities = numbers([("rms_mm", rms), ("rms_undone_mm", undone)]);
+        let found = Finding::from(mistake);
+        let text = format!(
+            "{}; {} (touches miss by {rms:.2} mm RMS, by {undone:.2} mm without)",
+            found.seen(),
+            found.remedy()
+        );
+        return vec![finding(found.code(), Weight::Gate, quantities, text)];
+    }
+    let mut all = Vec::new();
+    let left_out: Vec<usize> = (0..touches.all.len()).filter(|&k| fit.judged[k].left_out).collect();
+    if !left_out.is_empty() {
+        let name = |&k: &usize| format!("{} ({:.2} mm)", touches.all[k].stop, 1e3 * fit.judged[k].residual_m.norm());
+        let named: Vec<String> = left_out.iter().take(NAMED).map(name).collect();
+        let more = if left_out.len() > NAMED { ", .." } else { "" };
+        let text = format!(
+            "{} of {} touches disagree with the others and are left out: {}{more}; look at them: another point, a slip, a wrong line",
+            left_out.len(),
+            touches.all.len(),
+            named.join(", ")
+        );
+        let share = left_out.len() as f64 / touches.all.len() as f64;
+        let weight = if share > limits.share_of_images_left_out { Weight::Gate } else { Weight::Note };
+        all.push(finding(Code::TouchesLeftOut, weight, numbers([("touches", left_out.len() as f64)]), text));
+    }
+    if fit.factor > limits.touch_factor {
+        let text = format!(
+            "the touches scatter {:.1} times as much as their stated sigma ({:.3} mm RMS): a loose tip, another order of points, or the wrong robot; correct sigma_m if they are no better",
+            fit.factor,
+            1e3 * fit.rms_m
+        );
+        all.push(finding(
+            Code::TouchesScatter,
+            Weight::Gate,
+            numbers([("factor", fit.factor), ("rms_mm", 1e3 * fit.rms_m)]),
+            text,
+        ));
+    }
+    let in_one = fit.robot_sigmas > limits.sigmas_beyond_tolerance;
+    if fit.robot_factor > limits.touch_factor || in_one {
+        let how_far = match in_one {
+            true => format!("what is {:.1} sigmas from the solution", fit.robot_sigmas),
+            false => format!("{:.1} times as much as the solution leaves open", fit.robot_factor),
+        };
+        let text = format!(
+            "the touches say of the robot {how_far}: another robot, tool or mastering than that of the solution{}",
+            if fit.tool_covariances[0].is_none() { ", or a tool that was given wrongly" } else { "" }
+        );
+        let quantities = numbers([("factor", fit.robot_factor), ("sigmas", fit.robot_sigmas)]);
+        all.push(finding(Code::RobotContradicted, Weight::Gate, quantities, text));
+    }
+    let weak = |what: &str, covariance: &Matrix3<f64>, per_m: f64, unit: &str| {
+        let eigen = covariance.symmetric_eigen();
+        let k = eigen.eigenvalues.imax();
+        let mm = 1e3 * per_m * eigen.eigenvalues[k].max(0.0).sqrt();
+        let d = eigen.eigenvectors.column(k);
+        let text = format!(
+            "{what} is hardly told along ({:.2}, {:.2}, {:.2}): sigma {mm:.1} mm{unit}; touch with the tip turned further, and points further apart",
+            d[0], d[1], d[2]
+        );
+        (mm > limits.frame_sigma_mm).then(|| finding(Code::FrameWeak, Weight::Gate, numbers([("sigma_mm", mm)]), text))
+    };
+    for (name, covariance) in touches.bodies.iter().zip(&fit.tool_covariances) {
+        let Some(c) = covariance else { continue };
+        all.extend(weak(&format!("the point of '{name}'"), &c.fixed_view::<3, 3>(0, 0).into_owned(), 1.0, ""));
+    }
+    if let (Some(c), false) = (&fit.work_covariance, touches.all.is_empty()) {
+        let (c, spread) = at_the_places(c, touches);
+        all.extend(weak("the work object", &c.fixed_view::<3, 3>(0, 0).into_owned(), 1.0, ""));
+        let turn = c.fixed_view::<3, 3>(3, 3).into_owned();
+        all.extend(weak("the turn of the work object about an axis", &turn, spread, " at the places"));
+    }
+    all
+}
+
+/// Covariance of a work object (body twist) in the middle of the places, and how far these reach from it, m RMS.
+pub fn at_the_places(covariance: &DMatrix<f64>, touches: &Touches) -> (Matrix6<f64>, f64) {
+    let places: Vec<Vector3<f64>> = touches.placed().map(|(_, p)| p).collect();
+    let n = places.len().max(1) as f64;
+    let mean = places.iter().sum::<Vector3<f64>>() / n;
+    let spread = (places.iter().map(|p| (p - mean).norm_squared()).sum::<f64>() / n).sqrt();
+    let shift = adjoint(&Pose::new(Matrix3::identity(), -mean));
+    let c = Matrix6::from_column_slice(covariance.as_slice());
+    (shift * c * shift.transpose(), spread)
+}

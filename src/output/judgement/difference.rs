@@ -1,0 +1,129 @@
+//! Two solutions against each other over the workspace.
+
+use crate::assess::{MeasuredPoint, fit_points};
+use crate::error::{Code, Error, Result};
+use crate::output::restore::{FoundModel, entered_offsets, found_model};
+use crate::output::solution_json::SolutionRecord;
+use crate::problem::short_name;
+
+/// Sigmas of the difference from which two estimates disagree.
+const DISAGREE: f64 = 3.0;
+
+/// How far two solutions are apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Difference {
+    /// Places compared.
+    pub places: usize,
+    /// RMS distance of the flange, m, after the base frames and a point of the flange were brought together.
+    pub rms_m: f64,
+    /// Largest distance, m, with the readings (rad or m) where it is.
+    pub worst_m: f64,
+    /// Readings at the worst place.
+    pub worst_at: Vec<f64>,
+    /// RMS of the stated sigmas of both together at these places, m; none where a solution has no map.
+    pub stated_m: Option<f64>,
+}
+
+/// Estimates of parameters of both that differ by more than three sigmas of their difference: name, first, second, sigmas.
+pub type Disagreement = (String, f64, f64, f64);
+
+/// What differs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SolutionDifference {
+    /// In the region that the stops of both covered.
+    pub covered: Option<Difference>,
+    /// Over all joint limits.
+    pub everywhere: Difference,
+    /// Parameters, largest first.
+    pub parameters: Vec<Disagreement>,
+    /// What the exported files of the second expect of readings beside those of the first, rad or m: not none where offsets are entered in the
+    /// controller for one of them, and the two take different joint angles.
+    pub zeros: Vec<f64>,
+    /// Joint names.
+    pub joints: Vec<String>,
+}
+
+/// Compares `b` with `a` at the places of both workspace maps, for the readings that they were identified from.
+///
+/// # Errors
+/// Solutions of robots with different joints, or without workspace map.
+pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<SolutionDifference> {
+    if a.robot.readings != b.robot.readings {
+        let what = format!("joints {} against {}", a.robot.readings.join(", "), b.robot.readings.join(", "));
+        return Err(Error::new(Code::RobotDiffers, "solutions", what, "compare solutions of the same robot"));
+    }
+    let (first, second) = (found_model(a)?, found_model(b)?);
+    let places: Vec<Place> = [(a, &second), (b, &first)]
+        .into_iter()
+        .flat_map(|(record, other)| {
+            let other = other.flange();
+            record.workspace.iter().map(move |w| Place {
+                readings: w.readings.clone(),
+                covered: w.covered && other.as_ref().is_some_and(|o| o.at(&w.readings).outside.is_empty()),
+            })
+        })
+        .collect();
+    let all: Vec<&Place> = places.iter().collect();
+    let covered: Vec<&Place> = places.iter().filter(|p| p.covered).collect();
+    let everywhere = difference(&first, &second, &all).ok_or_else(|| {
+        Error::new(Code::SolutionDiffers, "solutions", "they have no workspace map in common", "identify both again")
+    })?;
+    Ok(SolutionDifference {
+        covered: difference(&first, &second, &covered),
+        everywhere,
+        parameters: disagreements(a, b),
+        zeros: entered_offsets(b)?.iter().zip(entered_offsets(a)?).map(|(b, a)| b - a).collect(),
+        joints: a.robot.readings.clone(),
+    })
+}
+
+struct Place {
+    readings: Vec<f64>,
+    covered: bool,
+}
+
+/// Fewest places that determine frames and flange point.
+const FEWEST_PLACES: usize = 8;
+
+fn difference(a: &FoundModel, b: &FoundModel, places: &[&Place]) -> Option<Difference> {
+    if places.len() < FEWEST_PLACES {
+        return None;
+    }
+    // The flange of the first as a device would see it; frame and point on the flange of the second are fitted.
+    let points: Vec<MeasuredPoint> = (places.iter())
+        .map(|p| MeasuredPoint {
+            position_m: a.robot.base_from_tip(&p.readings).translation,
+            readings: p.readings.clone(),
+        })
+        .collect();
+    let fit = fit_points(&b.robot, &points)?;
+    let (worst, worst_m) = (fit.residuals_m.iter().map(|r| r.norm()).enumerate()).max_by(|x, y| x.1.total_cmp(&y.1))?;
+    let stated = || {
+        let (a, b) = (a.flange()?, b.flange()?);
+        let sum: f64 = (places.iter())
+            .map(|p| a.at(&p.readings).sigmas()[0].powi(2) + b.at(&p.readings).sigmas()[0].powi(2))
+            .sum();
+        Some((sum / places.len() as f64).sqrt())
+    };
+    Some(Difference {
+        places: places.len(),
+        rms_m: fit.rms_m,
+        worst_m,
+        worst_at: places[worst].readings.clone(),
+        stated_m: stated(),
+    })
+}
+
+fn disagreements(a: &SolutionRecord, b: &SolutionRecord) -> Vec<Disagreement> {
+    let robot = |e: &&crate::output::solution_json::EstimateRecord| e.name.starts_with("robot/");
+    let mut found: Vec<Disagreement> = (a.estimates.iter().filter(robot))
+        .filter_map(|x| {
+            let y = b.estimates.iter().find(|y| y.name == x.name)?;
+            let (vx, vy, sx, sy) = (x.value?, y.value?, x.sigma?, y.sigma?);
+            let sigmas = (vx - vy).abs() / sx.hypot(sy).max(f64::MIN_POSITIVE);
+            Some((short_name(&x.name), vx, vy, sigmas)).filter(|d| d.3 > DISAGREE)
+        })
+        .collect();
+    found.sort_by(|x, y| y.3.total_cmp(&x.3));
+    found
+}

@@ -1,0 +1,5 @@
+//! A plan: what it starts from (`plan_start`), its series folder and plan.json (`plan_files`), and its stops as robot programs (`plan_programs`).
+
+pub mod plan_files;
+pub mod plan_programs;
+pub mod plan_start;

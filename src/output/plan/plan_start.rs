@@ -1,0 +1,171 @@
+//! What a plan starts from: camera.yaml, pose files, solution.json.
+
+use std::path::Path;
+
+use nalgebra::{Matrix2, Vector2, Vector6};
+use serde::Deserialize;
+
+use crate::error::{Code, Error, Result};
+use crate::files::{self, FileKind};
+use crate::geom::Pose;
+use crate::identify::RobotModel;
+use crate::model::camera::Camera;
+use crate::model::joint_terms::JointTerm;
+use crate::model::robot::{Posture, Robot};
+use crate::output::solution_json::{ImageRecord, ObservationColumns, SolutionRecord};
+use crate::plan::setting::{PlannedStop, Setting};
+use crate::problem::{Image, Mark, MarkerObservation};
+use crate::series::{Marker, Plate};
+use crate::urdf::Chain;
+
+#[derive(Deserialize)]
+struct PoseFile {
+    xyz_m: [f64; 3],
+    quat_xyzw: Option<[f64; 4]>,
+    rpy_rad: Option<[f64; 3]>,
+}
+
+fn text(path: &Path) -> Result<String> {
+    files::read_text(path, FileKind::Settings)
+}
+
+/// The pose of a file like hand_camera.yaml or plate_pose.yaml.
+///
+/// # Errors
+/// Unreadable files, no rotation.
+pub fn read_pose(path: &Path) -> Result<Pose> {
+    let remedy = "give a file with xyz_m and quat_xyzw or rpy_rad, as identify writes hand_camera.yaml";
+    let file: PoseFile =
+        serde_saphyr::from_str(&text(path)?).map_err(|e| Error::new(Code::SettingSyntax, path.display(), e, remedy))?;
+    match (file.quat_xyzw, file.rpy_rad) {
+        (Some(q), _) => Ok(Pose::from_xyz_quaternion(file.xyz_m, q)),
+        (None, Some(rpy)) => Ok(Pose::from_xyz_rpy(file.xyz_m, rpy)),
+        (None, None) => Err(Error::new(Code::SettingMissing, path.display(), "has no rotation", remedy)),
+    }
+}
+
+/// Setting and images of a solution: the robot as calibrated, its camera, mounting and placements, the images in use.
+///
+/// Of several cameras and mountings the first image on the robot decides; `chain` is that of the URDF given.
+///
+/// # Errors
+/// A solution of another robot, or without images on the robot.
+pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -> Result<(Setting, Vec<PlannedStop>)> {
+    let refuse = |what: String, remedy: &str| Error::new(Code::SolutionDiffers, "solution.json", what, remedy);
+    if record.robot.readings != chain.readings {
+        let what = format!("is of joints {}", record.robot.readings.join(", "));
+        return Err(refuse(what, "give the URDF, --base and --tip with which it was made"));
+    }
+    let first = record.images.iter().find(|i| i.is_used_on_robot()).ok_or_else(|| {
+        refuse("has no image on the robot in use".into(), "plan from --plate-pose and --hand-camera instead")
+    })?;
+    let camera = &record.cameras[first.camera];
+    let mut lens = Camera::pinhole(camera.lens, camera.width_px, camera.height_px, 1.0);
+    for (slot, (_, value)) in lens.parameters.iter_mut().zip(&camera.parameters) {
+        *slot = *value;
+    }
+    let lens = lens.without_field();
+    let used = |i: &&ImageRecord| {
+        i.is_used_on_robot() && (i.camera, i.mounting, i.plate) == (first.camera, first.mounting, first.plate)
+    };
+    let stops: Vec<PlannedStop> =
+        record.images.iter().filter(used).filter_map(|i| taken(i, camera.pixel_factor, record)).collect();
+    let setting = Setting {
+        robot: calibrated(record, chain, model),
+        camera: lens,
+        mount: first.camera_mount,
+        mounting: (&record.mountings[first.mounting].pose).into(),
+        placements: record.placements.iter().map(|p| (p.name.clone(), (&p.pose).into())).collect(),
+        plate: plate(record, first.plate),
+        pixel_sigma_px: typical_sigma(&stops),
+        joint_sigma: camera.joint_noise.clone(),
+    };
+    Ok((setting, stops))
+}
+
+/// The robot with the twists and terms of the solution; terms of the model that it has not stand at zero.
+fn calibrated(record: &SolutionRecord, chain: Chain, model: RobotModel) -> Robot {
+    let mut robot = model.robot(chain);
+    for (joint, twist) in robot.chain.joints.iter().zip(&mut robot.twists).filter(|(j, _)| j.states_origin()) {
+        if let Some(found) = record.robot.joints.iter().rfind(|j| j.name == joint.name) {
+            *twist = Vector6::from(found.twist);
+        }
+    }
+    let readings = robot.chain.readings.clone();
+    let value = |t: &JointTerm| {
+        let same =
+            |r: &&crate::output::solution_json::TermRecord| r.reading == readings[t.reading] && r.term == t.term.name();
+        record.robot.terms.iter().find(same).map_or(0.0, |r| r.value)
+    };
+    let values: Vec<f64> = robot.terms.iter().map(value).collect();
+    robot.terms.iter_mut().zip(values).for_each(|(t, v)| t.value = v);
+    robot
+}
+
+fn plate(record: &SolutionRecord, index: usize) -> Plate {
+    let p = &record.plates[index];
+    let mut plate = Plate::lattice(p.kind, p.columns, p.rows, p.pitch_m, p.tolerance_m);
+    plate.scale = p.scale;
+    plate.markers = (0..p.id.len())
+        .map(|k| Marker {
+            id: p.id[k],
+            position_m: p.position_m[k].into(),
+            outer_radius_m: p.radii_m[k][0],
+            inner_radius_m: p.radii_m[k][1],
+            sigma_m: p.prior_sigma_m[k],
+        })
+        .collect();
+    plate
+}
+
+/// A stop of the solution, with the observations in use at the place where they are predicted; `None` off the robot.
+fn taken(image: &ImageRecord, pixel_factor: f64, record: &SolutionRecord) -> Option<PlannedStop> {
+    let plate = &record.plates[image.plate];
+    let posture = Posture { readings: image.readings.clone()?, approach: image.approach.clone() };
+    let image = Image {
+        name: image.name.clone(),
+        series: 0,
+        stop: 0,
+        camera: 0,
+        mounting: 0,
+        placement: image.placement,
+        plate: 0,
+        mount: image.camera_mount,
+        observations: observations(&image.observations, pixel_factor, &plate.id).into(),
+        rejected: None,
+    };
+    Some(PlannedStop { posture, image })
+}
+
+fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) -> Vec<MarkerObservation> {
+    let one = |k: usize| {
+        if columns.reason[k].is_some() {
+            return None;
+        }
+        let [uu, uv, vv] = columns.covariance[k];
+        let information = (Matrix2::new(uu, uv, uv, vv) * pixel_factor.powi(2)).try_inverse()?;
+        let uv = Vector2::from(columns.uv[k]) - columns.duv[k].map_or(Vector2::zeros(), Vector2::from);
+        Some(MarkerObservation {
+            marker: ids.iter().position(|id| *id == columns.marker[k])?,
+            edge: columns.edge[k],
+            mark: Mark::of_radius(columns.radius_m[k]),
+            uv,
+            information,
+            rejected: None,
+        })
+    };
+    let mut all: Vec<MarkerObservation> = (0..columns.marker.len()).filter_map(one).collect();
+    all.sort_by_key(|o| (o.marker, o.edge));
+    all
+}
+
+/// Median standard deviation of an observation, px.
+fn typical_sigma(stops: &[PlannedStop]) -> f64 {
+    let mut all: Vec<f64> = stops
+        .iter()
+        .flat_map(|s| s.image.observations.iter())
+        .map(|o| (2.0 / o.information.trace().max(f64::MIN_POSITIVE)).sqrt())
+        .collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.05)
+}

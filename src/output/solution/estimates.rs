@@ -1,0 +1,70 @@
+//! All scalar estimates of the dense part with their sigmas, and their covariance.
+
+use super::solution_json::EstimateRecord;
+use crate::assess::Uncertainty;
+use crate::error::{Code, Error, Result};
+use crate::output::names::column_names;
+use crate::solve::Fit;
+
+/// Posterior sigma of a column in its unit; `None` where it was held fixed or nothing touches it.
+fn sigma(fit: &Fit, column: usize) -> Option<f64> {
+    let known = fit.problem.layout.columns[column].free && fit.covariance.system.touched(column);
+    known.then(|| fit.covariance.sigma(column))
+}
+
+/// `1 - sigma^2 / prior^2` of a column with a prior.
+fn share_of_data(fit: &Fit, column: usize) -> Option<f64> {
+    let prior = fit.problem.layout.columns[column].prior_sigma;
+    let sigma = sigma(fit, column).filter(|_| prior.is_finite())?;
+    Some((1.0 - (sigma / prior).powi(2)).max(0.0))
+}
+
+/// Every column with what is known of it, beside its covariance what an `uncertainty` says.
+///
+/// # Errors
+/// A value or sigma that is not finite.
+pub(super) fn estimates(
+    fit: &Fit,
+    series: &[String],
+    uncertainty: Option<&Uncertainty>,
+) -> Result<Vec<EstimateRecord>> {
+    let layout = &fit.problem.layout;
+    let values = fit.state.values(layout);
+    let poses = || layout.mountings.iter().chain(&layout.placements);
+    let names = column_names(&fit.problem, series);
+    let mut all = Vec::with_capacity(layout.len());
+    for (k, (column, name)) in layout.columns.iter().zip(names).enumerate() {
+        let sigma = sigma(fit, k);
+        if !values[k].is_finite() || sigma.is_some_and(|s| !s.is_finite()) {
+            let what = "its estimate is not finite";
+            return Err(Error::new(
+                Code::EstimateNotFinite,
+                name,
+                what,
+                "look at the images and joint readings that determine it",
+            ));
+        }
+        let prior = column.prior_sigma.is_finite();
+        all.push(EstimateRecord {
+            name,
+            unit: column.unit.into(),
+            value: (!poses().any(|r| r.contains(&k))).then_some(values[k]),
+            sigma,
+            prior_mean: prior.then_some(column.prior_mean),
+            prior_sigma: prior.then_some(column.prior_sigma),
+            sigma_model: sigma.and_then(|_| uncertainty?.model_sigma.get(k).copied()),
+            sigma_clustered: sigma.and_then(|_| uncertainty?.clustered_sigma.as_ref()?.get(k).copied()),
+            free: column.free,
+            share_of_data: share_of_data(fit, k),
+        });
+    }
+    Ok(all)
+}
+
+/// Lower triangle of the covariance of the dense part, row by row; zero where a column was held fixed or is not touched.
+pub(super) fn lower_triangle(fit: &Fit) -> Vec<f64> {
+    let known: Vec<bool> = (0..fit.problem.layout.len()).map(|k| sigma(fit, k).is_some()).collect();
+    let c = &fit.covariance.reduced;
+    let entry = |i: usize, j: usize| if known[i] && known[j] { c[(i, j)] } else { 0.0 };
+    (0..known.len()).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).collect()
+}
