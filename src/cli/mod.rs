@@ -1,50 +1,19 @@
 //! Flags, progress, one thin file per subcommand; the only room that prints.
 //!
-//! To add a subcommand: a file with its `Args` and `run`, a variant of `Command` and a row in `Command::run`.
+//! To add a subcommand: a file with its `Args` and `run` in one of the folders below, a variant of `Command` and a row in `Command::run`.
+//!
+//! Subcommands in the order of the work: `images` (plates and images, no robot), `series` (planned, simulated, converted, looked through), `results` (identified
+//! and shown), `corrected_robot` (frames, programs and tests of what was identified). All of them take from `flags` and `terminal`.
 
-mod against;
-mod arguments;
-mod at;
-mod camera_args;
-mod choices;
-mod compare;
-mod compensate;
-mod compensate_frames;
-mod compensate_models;
-mod convert;
-mod convert_camera;
-mod detect;
-mod doctor;
+mod corrected_robot;
 mod examples;
-mod frames;
-mod identify;
-mod image_study;
-mod joint_table;
-mod long_table;
+mod flags;
+mod images;
 mod memory;
-mod paragraph;
-mod plan;
-mod plan_targets;
-mod plan_touches;
-mod plate;
-mod plate_board;
-mod pose_argument;
-mod poses;
-mod progress;
-mod recording;
-mod robot;
-mod say;
-mod show;
-mod simulate;
-mod stages;
-mod summary;
+mod results;
+mod series;
+mod terminal;
 mod verdict;
-mod verify;
-mod verify_args;
-mod verify_series;
-mod verify_stated;
-mod verify_verdict;
-mod zeros;
 
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
@@ -54,7 +23,12 @@ use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::prelude::*;
 
 use crate::error::{Code, Error, Result};
-use arguments::command_line;
+use corrected_robot::{compensate, frames, verify, verify_args};
+use flags::arguments::command_line;
+use images::{detect, plate, poses};
+use results::{compare, identify, long_table, show, summary};
+use series::{convert, doctor, plan, simulate};
+use terminal::{progress, say, stages};
 use verdict::Verdict;
 
 /// Calibrates a robot, its camera and a plate of markers in one problem, directly from images.

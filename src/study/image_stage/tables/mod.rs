@@ -1,6 +1,6 @@
 //! The report on the image stage: what it reaches on rendered pictures, one section for each part of the study.
 //!
-//! A new part is a file here that returns a [`Section`], and a variant of `Part` in `cli/image_study.rs`.
+//! A new part is a file here that returns a [`Section`], and a variant of `Part` in `cli/images/image_study.rs`.
 
 mod bias;
 mod identity;

@@ -1,0 +1,536 @@
+//! `robotcal frames`: tool and work object of a robot that was identified, from touches.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nalgebra::DMatrix;
+
+use super::zeros::{ReadingsArgs, Zeros};
+use crate::assess::Limits;
+use crate::cli::Verdict;
+use crate::cli::flags::pose_argument::pose;
+use crate::cli::results::show::read_solution;
+use crate::cli::terminal::say::{self, say, say_line};
+use crate::diagnose::{Mistake, Weight};
+use crate::error::{Code, Error, Notice, Result, closest_name};
+use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, Seen, Touches, fit};
+use crate::geom::{Pose, matrix_from_rpy};
+use crate::identify::{measure_bodies, touch_mistake};
+use crate::output::corrections::{FileFinding, numbers};
+use crate::output::frame_files::{self, Frames, Named};
+use crate::output::frame_findings::{at_the_places, frame_findings};
+use crate::output::frames_record::{
+    self, FILE_NAME, FORMAT, FramesRecord, KnowledgeRecord, RobotOfFrames, ToolKind, ToolRecord, TouchRecord, WorkKind,
+    WorkRecord, checks, flat, rows,
+};
+use crate::output::restore::{FoundModel, chain, exported_model, robot_description};
+use crate::output::solution_json::SolutionRecord;
+use crate::output::work_findings::{from_below, other_frame};
+use crate::output::{ResultFolder, folder_name};
+use crate::problem::MeasuredSeries;
+use crate::series::{self, InputFile, Series};
+use crate::urdf::{RobotDescription, patch_origins};
+
+/// Flags of `frames`.
+#[derive(Debug, Args)]
+pub struct FramesArgs {
+    /// solution.json of the robot
+    #[arg(long, value_name = "FILE")]
+    from: PathBuf,
+    /// Folder with series.toml, joints.csv and contacts.csv (or points.csv, poses.csv); several of them for several sessions with one tool
+    #[arg(long, value_name = "FOLDER", num_args = 1.., required_unless_present = "plate")]
+    touches: Vec<PathBuf>,
+    /// The plate of the solution is the work object; of several placements this one. Touches of it are in its frame
+    #[arg(long, value_name = "PLACEMENT", num_args = 0..=1, default_missing_value = "")]
+    plate: Option<String>,
+    /// The tool is known and not estimated: x,y,z[,roll,pitch,yaw] on the tip, m and degrees
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true)]
+    tool: Vec<f64>,
+    /// Orientation of the tool that is written, where touches tell its point only: roll,pitch,yaw on the tip, degrees [default: that of the tip]
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true, conflicts_with = "tool")]
+    tool_rpy_deg: Vec<f64>,
+    /// Name of the tool in what is written
+    #[arg(long, value_name = "NAME", default_value = "tcp")]
+    tool_name: String,
+    /// Frame in which the controller computes, a link fixed beside the arm (`base` of ur_description): the work object is written in it, too
+    #[arg(long, value_name = "LINK")]
+    base: Option<String>,
+    #[command(flatten)]
+    readings: ReadingsArgs,
+    /// Folder for frames.json, the programs and the URDF with both frames
+    #[arg(long, value_name = "FOLDER", default_value = "frames")]
+    out: PathBuf,
+}
+
+/// Touches with what they were read from.
+struct Measured {
+    touches: Touches,
+    files: Vec<InputFile>,
+    notices: Vec<Notice>,
+}
+
+pub fn run(args: &FramesArgs) -> Result<Verdict> {
+    let place = ResultFolder::among(&args.out)?;
+    let record = read_solution(&args.from)?;
+    let description = robot_description(&record)?;
+    let found = exported_model(&record)?;
+    let Measured { mut touches, files, notices } = read_touches(args, &record, &description)?;
+    let zeros = args.readings.of(&record, &files)?.filter(|_| !touches.all.is_empty());
+    zeros.iter().for_each(|zeros| touches.add(&zeros.missing));
+    let placement = args.plate.as_ref().map(|name| placement_named(&record, name)).transpose()?;
+    let robot = found.known_robot(placement)?;
+    let plate = placement.map(|p| Pose::from(&record.placements[p].pose));
+    let tool = known_tool(args)?;
+    let nothing = touches.all.is_empty();
+    if nothing {
+        touches.bodies.push(args.tool_name.clone());
+        touches.frame = placement.map(|p| record.placements[p].name.clone());
+    }
+    let tool_told = tool.is_some() || !nothing;
+    let given = Given { tool: tool.or_else(|| nothing.then(Pose::identity)), plate };
+    let mut fitted = fit(&robot, &touches, &given, &found.limits).map_err(|e| named(e, args))?;
+    if !touches.is_pose(0) && tool.is_none() {
+        fitted.tools[0].rotation = orientation(args)?;
+    }
+    let subject = args.touches.first().unwrap_or(&args.from).display().to_string();
+    let mistake = touch_mistake(&robot, &touches, &given, (&fitted, &found.limits));
+    let mut findings = findings((&fitted, mistake), &touches, (&found.limits, placement), &subject);
+    findings.extend(other_frame(&record.robot.base, (&fitted, &work_name(&touches)), &found.limits, &subject));
+    findings.extend(
+        zeros.as_ref().and_then(|z| other_zeros((&fitted, z), (&robot, &touches, &given), &found.limits, &subject)),
+    );
+    findings.extend(from_below(robot.exported(), (&fitted, &touches), &found.limits, &subject));
+    let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
+    let made = FramesRecord {
+        format: FORMAT,
+        version: env!("CARGO_PKG_VERSION").into(),
+        command: std::env::args().collect::<Vec<_>>().join(" "),
+        robot: RobotOfFrames {
+            solution: InputFile::of_file(&args.from)?,
+            name: record.robot.name.clone(),
+            base: record.robot.base.clone(),
+            tip: record.robot.tip.clone(),
+            checks: checks(&robot),
+        },
+        inputs: files,
+        tool: tool_told.then(|| tool_record(args, &record, &fitted, &touches)),
+        work: fitted.work.as_ref().map(|pose| WorkRecord {
+            name: work_name(&touches),
+            parent: record.robot.base.clone(),
+            measured: if placement.is_some() { WorkKind::Plate } else { WorkKind::Measured },
+            pose: pose.into(),
+            covariance: fitted.work_covariance.as_ref().map_or_else(Vec::new, flat),
+        }),
+        sigma_factor: fitted.factor,
+        rms_m: fitted.rms_m,
+        expected: fitted.expected,
+        touches: touch_records(&fitted, &touches),
+        findings: findings.clone(),
+        knowledge: KnowledgeRecord {
+            placement,
+            frames: rows(&fitted.knowledge.frames),
+            cross: rows(&fitted.knowledge.cross),
+            learned: fitted.knowledge.learned.as_slice().to_vec(),
+            taken: fitted.knowledge.taken.as_slice().to_vec(),
+        },
+    };
+    let mut files = frame_files::files(&frames);
+    files.insert(FILE_NAME.into(), frames_record::to_bytes(&made)?);
+    let urdf = corrected_urdf(&record, &found, &in_the_base(&frames, &record, &fitted))?;
+    files.insert(format!("{}.frames.urdf", folder_name(std::slice::from_ref(&record.robot.name))), urdf.into_bytes());
+    let listed: Vec<(String, &[u8])> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+    place.write_beside(&listed, std::slice::from_ref(&args.from))?;
+    say!("{}", text(args, &made, &fitted, &touches, &robot));
+    zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
+    for notice in &notices {
+        say_line!("note      {}", notice.coded());
+    }
+    say::findings(&findings);
+    say_line!("results   {} ({})", args.out.display(), files.keys().cloned().collect::<Vec<_>>().join(", "));
+    Ok(if findings.iter().all(|f| f.weight == Weight::Note) { Verdict::Good } else { Verdict::GateFailed })
+}
+
+/// What is to be said of the fit. The plate of a solution counts by where it brings the tool: in the base it stands as uncertainly as the base
+/// itself, which no target sees.
+fn findings(
+    (fit, mistake): (&FrameFit, Option<Mistake>),
+    touches: &Touches,
+    (limits, placement): (&Limits, Option<usize>),
+    subject: &str,
+) -> Vec<FileFinding> {
+    let is_explained = mistake.is_some();
+    let work_covariance = if placement.is_some() { None } else { fit.work_covariance.clone() };
+    let by_use = FrameFit { work_covariance, ..fit.clone() };
+    let mut all = frame_findings((&by_use, mistake), touches, limits, subject);
+    if !is_explained {
+        all.extend(placement.and_then(|_| plate_weak(fit, touches, limits, subject)));
+        all.extend(too_exact(fit, limits, subject));
+    }
+    all
+}
+
+/// The touches contradict the solution as their readings are taken, and do not the other way.
+fn other_zeros(
+    (fit, zeros): (&FrameFit, &Zeros),
+    (robot, touches, given): (&KnownRobot, &Touches, &Given),
+    limits: &Limits,
+    subject: &str,
+) -> Option<FileFinding> {
+    let mut otherwise = touches.clone();
+    otherwise.add(&zeros.instead());
+    let factor = fit.contradiction(limits);
+    let other = frames::fit(robot, &otherwise, given, limits).ok()?;
+    let (other_factor, word) = (other.contradiction(limits), zeros.other());
+    let text = format!(
+        "the touches contradict the solution {factor:.1} times as far as they may with their readings as taken, and {other_factor:.1} times as those of the controller {word} the offsets of mastering.csv were entered: say --readings {word}"
+    );
+    let quantities = numbers([("factor", factor), ("other_factor", other_factor)]);
+    let is_other = factor > limits.touch_factor && other_factor <= limits.touch_factor;
+    is_other.then(|| gate(Code::ReadingsOfOtherZeros, subject, quantities, text))
+}
+
+/// The tool is hardly known relative to the plate.
+fn plate_weak(fit: &FrameFit, touches: &Touches, limits: &Limits, subject: &str) -> Option<FileFinding> {
+    let sigma_mm = 1e3 * fit.expected.with_frames_m;
+    let text = format!(
+        "the tool relative to the plate is hardly told: {sigma_mm:.1} mm RMS expected over the stops of the solution and the touches; touch with the tip turned further, and markers further apart"
+    );
+    let is_weak = !touches.all.is_empty() && sigma_mm > limits.frame_sigma_mm;
+    is_weak.then(|| gate(Code::FrameWeak, subject, numbers([("sigma_mm", sigma_mm)]), text))
+}
+
+/// Touches as exact as only computed ones are: those of a plan, with the joint values that it proposed.
+fn too_exact(fit: &FrameFit, limits: &Limits, subject: &str) -> Option<FileFinding> {
+    let AsStated { size, freedom } = fit.as_stated;
+    let text = format!(
+        "the touches fit {:.0} times better than their stated sigma and the joint noise let them ({:.4} mm RMS, {freedom} degrees of freedom): these are the joint values of a plan, or computed ones, not those at which the tool touched; write these into joints.csv (or correct sigma_m, if it is so much too large)",
+        1.0 / size.max(f64::MIN_POSITIVE),
+        1e3 * fit.rms_m
+    );
+    let quantities = numbers([("size", size), ("freedom", freedom as f64), ("rms_mm", 1e3 * fit.rms_m)]);
+    let is_exact = freedom >= limits.exact_touches_freedom && size < limits.exact_touches;
+    is_exact.then(|| gate(Code::TouchesExact, subject, quantities, text))
+}
+
+fn gate(code: Code, subject: &str, quantities: BTreeMap<String, f64>, text: String) -> FileFinding {
+    FileFinding { code, weight: Weight::Gate, subject: subject.to_owned(), quantities, text }
+}
+
+/// The failure of the fit with the folders of the touches that it is about.
+fn named(error: Error, args: &FramesArgs) -> Error {
+    let folders: Vec<String> = args.touches.iter().map(|t| t.display().to_string()).collect();
+    if folders.is_empty() { error } else { Error { place: folders.join(", "), ..error } }
+}
+
+fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotDescription) -> Result<Measured> {
+    if args.touches.is_empty() {
+        return Ok(Measured { touches: Touches::default(), files: Vec::new(), notices: Vec::new() });
+    }
+    let chain = chain(record, description, &record.robot.base, &record.robot.tip)?;
+    let (mut all, mut files, mut notices): (Vec<MeasuredSeries>, _, _) = (Vec::new(), Vec::new(), Vec::new());
+    for folder in &args.touches {
+        holds_touches(folder)?;
+        let s = series::read(folder)?;
+        same_links(&s, record)?;
+        let measured = measure_bodies(&s, &chain, false)?;
+        files.extend(s.inputs);
+        notices.extend(measured.notices);
+        all.push(measured.series);
+    }
+    Ok(Measured { touches: Touches::of(&all)?, files, notices })
+}
+
+/// A folder that has none of the files is another one than was meant.
+fn holds_touches(folder: &Path) -> Result<()> {
+    let names = series::SpatialFiles::NAMES;
+    if !folder.join("series.toml").is_file() || names.iter().any(|name| folder.join(name).is_file()) {
+        return Ok(());
+    }
+    let what = format!("has none of {}: nothing was touched or tracked", names.join(", "));
+    let remedy = "write contacts.csv with the columns stop,contact,x_m,y_m,z_m";
+    Err(Error::new(Code::FileMissing, folder.display(), what, remedy))
+}
+
+/// Base and tip that a series states are those of the solution.
+fn same_links(s: &Series, record: &SolutionRecord) -> Result<()> {
+    let stated = [("base", &s.manifest.base, &record.robot.base), ("tip", &s.manifest.tip, &record.robot.tip)];
+    for (key, stated, of_solution) in stated {
+        if let Some(link) = stated.as_ref().filter(|link| *link != of_solution) {
+            let what = format!("{key} = \"{link}\", and the solution is of {key} \"{of_solution}\"");
+            let remedy = format!(
+                "the frames go with the robot of the solution: write {key} = \"{of_solution}\" or leave it out, or identify to this {key}"
+            );
+            return Err(Error::new(Code::SolutionDiffers, s.manifest_file().display(), what, remedy));
+        }
+    }
+    Ok(())
+}
+
+fn placement_named(record: &SolutionRecord, name: &str) -> Result<usize> {
+    let names: Vec<&str> = record.placements.iter().map(|p| p.name.as_str()).collect();
+    let refuse = |what: String, remedy: String| Err(Error::new(Code::OptionRange, "--plate", what, remedy));
+    let hand = record.images.iter().any(|i| i.camera_mount == series::CameraMount::Hand && i.is_on_robot());
+    if names.is_empty() || !hand {
+        let what = "the solution has no plate that stands in the base".to_owned();
+        return refuse(what, "give touches of the work object with --touches".into());
+    }
+    match names.iter().position(|n| *n == name) {
+        Some(found) => Ok(found),
+        None if name.is_empty() && names.len() == 1 => Ok(0),
+        None if name.is_empty() => {
+            refuse(format!("the plate stood at {} places", names.len()), format!("name one: {}", names.join(", ")))
+        }
+        None => {
+            let meant =
+                closest_name(name, names.iter().copied()).map_or_else(String::new, |m| format!("is \"{m}\" meant? "));
+            refuse(format!("\"{name}\" is no placement"), format!("{meant}its placements are {}", names.join(", ")))
+        }
+    }
+}
+
+fn orientation(args: &FramesArgs) -> Result<nalgebra::Matrix3<f64>> {
+    match *args.tool_rpy_deg {
+        [] => Ok(nalgebra::Matrix3::identity()),
+        [roll, pitch, yaw] => Ok(matrix_from_rpy([roll, pitch, yaw].map(f64::to_radians))),
+        _ => {
+            let what = format!("{} numbers", args.tool_rpy_deg.len());
+            Err(Error::new(Code::OptionRange, "--tool-rpy-deg", what, "give roll,pitch,yaw in degrees"))
+        }
+    }
+}
+
+/// A tool that is not further away than any is, m.
+const FARTHEST_TOOL_M: f64 = 10.0;
+
+fn known_tool(args: &FramesArgs) -> Result<Option<Pose>> {
+    let xyz = args.tool.iter().take(3);
+    if xyz.clone().any(|v| v.abs() > FARTHEST_TOOL_M || !v.is_finite()) {
+        let what = format!("a tool {:.0} m from the tip", xyz.fold(0.0, |m: f64, v| m.max(v.abs())));
+        let remedy = "give x,y,z[,roll,pitch,yaw] on the tip, in metres and degrees";
+        return Err(Error::new(Code::OptionRange, "--tool", what, remedy));
+    }
+    pose("--tool", &args.tool)
+}
+
+/// Name of a frame of places that has none.
+const UNNAMED: &str = "work";
+
+fn work_name(touches: &Touches) -> String {
+    let name = touches.frame.as_deref().unwrap_or(UNNAMED);
+    // What places are called whose frame `[contact]` does not name.
+    if name == "contact" { UNNAMED.to_owned() } else { name.to_owned() }
+}
+
+fn tool_record(args: &FramesArgs, record: &SolutionRecord, fit: &FrameFit, touches: &Touches) -> ToolRecord {
+    let measured = match &fit.tool_covariances[0] {
+        None if args.tool.len() == 3 => ToolKind::GivenPoint,
+        None => ToolKind::Given,
+        Some(_) if touches.is_pose(0) => ToolKind::Pose,
+        Some(_) => ToolKind::Point,
+    };
+    ToolRecord {
+        name: args.tool_name.clone(),
+        parent: record.robot.tip.clone(),
+        measured,
+        pose: (&fit.tools[0]).into(),
+        covariance: fit.tool_covariances[0].as_ref().map(flat),
+    }
+}
+
+fn touch_records(fit: &FrameFit, touches: &Touches) -> Vec<TouchRecord> {
+    let record = |(t, judged): (&crate::frames::Touch, &crate::frames::Judged)| {
+        let (at, place) = match t.seen {
+            Seen::Point(place) => (work_name(touches), place),
+            Seen::Pose(pose) => (work_name(touches), pose.translation),
+            Seen::Unknown(contact) => (touches.contacts[contact].clone(), fit.places[contact]),
+        };
+        TouchRecord {
+            stop: t.stop.clone(),
+            body: touches.bodies[t.body].clone(),
+            at,
+            place_m: place.into(),
+            sigma_m: t.sigma_m,
+            residual_m: judged.residual_m.into(),
+            sigmas: judged.sigmas,
+            left_out: judged.left_out,
+        }
+    };
+    touches.all.iter().zip(&fit.judged).map(record).collect()
+}
+
+/// Frames as controllers take them: the work object in the frame that it computes in.
+fn written(
+    args: &FramesArgs,
+    record: &SolutionRecord,
+    description: &RobotDescription,
+    fit: &FrameFit,
+    touches: &Touches,
+    tool_told: bool,
+) -> Result<Frames> {
+    let own = &record.robot.base;
+    let base = args.base.as_ref().unwrap_or(own);
+    let own_from_base = match base == own {
+        true => Pose::identity(),
+        false => match description.fixed_base(base, &record.robot.tip) {
+            Some((link, pose)) if link == own => pose,
+            _ => {
+                let what = format!("\"{base}\" is not fixed on \"{own}\", the base of the solution");
+                return Err(Error::new(Code::LinkUnknown, "--base", what, "name a link that fixed joints tie to it"));
+            }
+        },
+    };
+    let work = fit.work.map(|pose| Named { name: work_name(touches), pose: own_from_base.inverse() * pose });
+    Ok(Frames {
+        tip: record.robot.tip.clone(),
+        base: base.clone(),
+        tool: tool_told.then(|| Named { name: args.tool_name.clone(), pose: fit.tools[0] }),
+        work,
+        payload: record.robot.payload,
+    })
+}
+
+/// The same in the base of the solution, as the URDF has it.
+fn in_the_base(frames: &Frames, record: &SolutionRecord, fit: &FrameFit) -> Frames {
+    let work = frames.work.as_ref().zip(fit.work).map(|(w, pose)| Named { name: w.name.clone(), pose });
+    Frames { base: record.robot.base.clone(), work, ..frames.clone() }
+}
+
+fn corrected_urdf(record: &SolutionRecord, found: &FoundModel, frames: &Frames) -> Result<String> {
+    let origins = found.robot.urdf_origins().into_iter().map(|(joint, origin)| (joint.to_owned(), origin)).collect();
+    frame_files::urdf(&patch_origins(&record.urdf.text, &origins)?, frames)
+}
+
+/// Square roots of the diagonal, in thousandths.
+fn sigmas(covariance: &DMatrix<f64>, first: usize) -> [f64; 3] {
+    [0, 1, 2].map(|k| 1e3 * covariance[(first + k, first + k)].max(0.0).sqrt())
+}
+
+/// Rows of touches that are printed.
+const MOST_ROWS: usize = 60;
+
+fn text(args: &FramesArgs, made: &FramesRecord, fit: &FrameFit, touches: &Touches, robot: &KnownRobot) -> String {
+    let mut out = String::new();
+    // Writing to a String cannot fail.
+    let _ = table(&mut out, args, made, fit, touches, robot);
+    out
+}
+
+fn table(
+    out: &mut String,
+    args: &FramesArgs,
+    made: &FramesRecord,
+    fit: &FrameFit,
+    touches: &Touches,
+    robot: &KnownRobot,
+) -> std::fmt::Result {
+    let show = |xyz: [f64; 3]| xyz.map(|v| format!("{:.3}", 1e3 * v + 0.0)).join(", ");
+    let three = |s: [f64; 3]| s.map(|v| format!("{v:.3}")).join(", ");
+    writeln!(
+        out,
+        "robot     {}, {} to {}, corrected by {}",
+        made.robot.name,
+        made.robot.base,
+        made.robot.tip,
+        args.from.display()
+    )?;
+    if !touches.all.is_empty() {
+        let used = fit.judged.iter().filter(|j| !j.left_out).count();
+        let stated = touches.all.iter().map(|t| t.sigma_m).fold(0.0, f64::max);
+        writeln!(
+            out,
+            "touches   {used} of {} in use, residual {:.3} mm RMS; sigma {:.3} mm as stated, {:.3} mm as found; joint noise {:.3} mm at the tool",
+            touches.all.len(),
+            1e3 * fit.rms_m,
+            1e3 * stated,
+            1e3 * stated * fit.factor,
+            1e3 * fit.expected.joint_noise_m
+        )?;
+    }
+    if let Some(tool) = &made.tool {
+        let pose = Pose::from(&tool.pose);
+        let how = match &fit.tool_covariances[0] {
+            None => "as given".to_owned(),
+            Some(c) if tool.measured == ToolKind::Pose => {
+                format!("sigma {} mm; sigma of the turn {} mrad", three(sigmas(c, 0)), three(sigmas(c, 3)))
+            }
+            Some(c) => format!("sigma {} mm", three(sigmas(c, 0))),
+        };
+        writeln!(out, "tool      {} on {}: {} mm, {how}", tool.name, tool.parent, show(pose.xyz()))?;
+        if tool.measured != ToolKind::Pose {
+            let rpy = pose.rpy().map(|v| format!("{:.4}", v.to_degrees() + 0.0)).join(", ");
+            writeln!(
+                out,
+                "          roll, pitch, yaw {rpy} deg as given: touches of a point do not tell how the tool is turned"
+            )?;
+        }
+        for (k, name) in touches.bodies.iter().enumerate().skip(1) {
+            writeln!(out, "          also {name}: {} mm", show(fit.tools[k].xyz()))?;
+        }
+    } else {
+        writeln!(out, "tool      not told: nothing was touched")?;
+    }
+    match (&made.work, &fit.work_covariance) {
+        (Some(work), Some(c)) => {
+            let pose = Pose::from(&work.pose);
+            let rpy = pose.rpy().map(|v| format!("{:.4}", v.to_degrees() + 0.0)).join(", ");
+            writeln!(
+                out,
+                "work      {} in {}: {} mm; roll, pitch, yaw {rpy} deg",
+                work.name,
+                work.parent,
+                show(pose.xyz())
+            )?;
+            if work.measured == WorkKind::Plate {
+                writeln!(
+                    out,
+                    "          the plate of the solution: known relative to the robot as the images tell it"
+                )?;
+            } else {
+                let (c, _) = at_the_places(c, touches);
+                let c = DMatrix::from_column_slice(6, 6, c.as_slice());
+                writeln!(
+                    out,
+                    "          sigma {} mm in the middle of the places, {} mrad about its axes",
+                    three(sigmas(&c, 0)),
+                    three(sigmas(&c, 3))
+                )?;
+            }
+        }
+        _ => writeln!(
+            out,
+            "work      not told: no place is known (x_m, y_m, z_m of contacts.csv); the base stands where the description says"
+        )?,
+    }
+    let of = if made.work.is_some() { "in the work object" } else { "in the base" };
+    writeln!(
+        out,
+        "expected  tool {of} {:.3} mm RMS over the {} stops of the solution and the touches (without these frames {:.3} mm), and joint noise {:.3} mm",
+        1e3 * fit.expected.with_frames_m,
+        robot.stops.len(),
+        1e3 * fit.expected.without_m,
+        1e3 * fit.expected.joint_noise_m
+    )?;
+    if !made.touches.is_empty() {
+        writeln!(
+            out,
+            "{:>10}  {:<12} {:>9} {:>9} {:>9} {:>8}  {:>6}",
+            "stop", "at", "dx mm", "dy mm", "dz mm", "mm", "sigmas"
+        )?;
+    }
+    for t in made.touches.iter().take(MOST_ROWS) {
+        let [x, y, z] = t.residual_m.map(|v| 1e3 * v);
+        let length = 1e3 * t.residual_m.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let left = if t.left_out { "  left out" } else { "" };
+        writeln!(
+            out,
+            "{:>10}  {:<12} {x:>9.3} {y:>9.3} {z:>9.3} {length:>8.3}  {:>6.1}{left}",
+            t.stop, t.at, t.sigmas
+        )?;
+    }
+    if made.touches.len() > MOST_ROWS {
+        writeln!(out, "          {} more in {FILE_NAME}", made.touches.len() - MOST_ROWS)?;
+    }
+    Ok(())
+}

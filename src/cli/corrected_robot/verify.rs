@@ -1,0 +1,249 @@
+//! `robotcal verify`: a corrected model judged by points that another device measured, or by another series.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use super::compensate_frames::Side;
+use super::compensate_models::not_given;
+use super::verify_args::VerifyArgs;
+use super::verify_series;
+use super::verify_stated::Stated;
+use super::verify_verdict::Reasons;
+use crate::assess::{
+    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, Ratio, ReadingMistake, bootstrap_ratio, by_cluster,
+    device_moved, fit_points, odd_points, reading_mistake,
+};
+use crate::cli::Verdict;
+use crate::cli::flags::joint_table::{self, Unit};
+use crate::cli::flags::robot::read_chain;
+use crate::cli::terminal::say::say_line;
+use crate::error::{Code, Error, Result};
+use crate::model::robot::Robot;
+use crate::output::compensated;
+use crate::output::restore::add;
+use crate::urdf::Chain;
+
+pub fn run(args: &VerifyArgs) -> Result<Verdict> {
+    match (&args.points, args.joint_unit) {
+        (Some(file), Some(unit)) => points(args, file, unit),
+        _ => verify_series::run(args, &args.recording),
+    }
+}
+
+/// A robot model with the fit of the points to it.
+struct Judged {
+    robot: Robot,
+    points: Vec<MeasuredPoint>,
+    /// For every point the number of its readings.
+    clusters: Vec<usize>,
+    fit: PointFit,
+}
+
+impl Judged {
+    fn of(robot: Robot, points: Vec<MeasuredPoint>, file: &Path) -> Result<Self> {
+        let fit = fit_points(&robot, &points).ok_or_else(|| {
+            Error::new(
+                Code::PointsUndetermined,
+                file.display(),
+                "the points do not determine the frame of the device and the reflector",
+                "measure at least 10 points that differ in position and in hand orientation",
+            )
+        })?;
+        Ok(Self { robot, clusters: clusters(&points), points, fit })
+    }
+
+    /// With offsets added to all readings, rad or m.
+    fn with_added(mut self, offsets: &[f64], file: &Path) -> Result<Self> {
+        self.points.iter_mut().for_each(|point| add(&mut point.readings, offsets));
+        Self::of(self.robot, self.points, file)
+    }
+
+    /// Number of points at different readings.
+    fn different(&self) -> usize {
+        self.clusters.iter().max().map_or(0, |last| last + 1)
+    }
+
+    /// By the points but some; `None` where the others do not determine the frames.
+    fn without(&self, left_out: &[usize]) -> Option<Self> {
+        let kept = self.points.iter().enumerate().filter(|(k, _)| !left_out.contains(k));
+        let points: Vec<MeasuredPoint> = kept.map(|(_, point)| point.clone()).collect();
+        let fit = fit_points(&self.robot, &points)?;
+        Some(Self { robot: self.robot.clone(), clusters: clusters(&points), points, fit })
+    }
+}
+
+fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
+    let model = judged(args, (&args.urdf, args.compensation.as_deref()), (file, unit))?;
+    let stated = Stated::beside(&args.urdf, &model.robot);
+    let limits = &Stated::limits_of(stated.as_ref());
+    let device_m = point_sigma(args.point_sigma_m, limits)?;
+    let zeros = args.readings.beside(stated.as_ref(), &args.urdf, &[])?;
+    let model = match &zeros {
+        Some(zeros) => model.with_added(&zeros.missing, file)?,
+        None => model,
+    };
+    refuse_mistaken(&model, &args.urdf, file, limits)?;
+    refuse_far(&model, &args.urdf, file, limits)?;
+    let count = model.points.len();
+    say_line!("points    {count} of {}; frame of the device and reflector fitted", file.display());
+    zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
+    say_line!("{}", line("model", &args.urdf, &model));
+    let nominal = args.nominal.as_ref().map(|urdf| {
+        let nominal = judged(args, (urdf, None), (file, unit))?;
+        refuse_far(&nominal, urdf, file, limits)?;
+        say_line!("{}", line("nominal", urdf, &nominal));
+        Ok(nominal)
+    });
+    let nominal = nominal.transpose()?;
+    let expected = stated.as_ref().and_then(|s| Some((s, s.at_points(&model.points, device_m)?)));
+    // What the model itself may miss, different in every posture, is no step of the device.
+    let may_miss = expected.as_ref().is_some_and(|(_, expected)| model.fit.rms_m <= expected.most_m);
+    let moved = device_moved(&model.robot, &model.points, &model.fit, limits).filter(|_| !may_miss);
+    let odd = if moved.is_none() { odd_points(&model.robot, &model.points, limits) } else { None };
+    moved.iter().for_each(say_moved);
+    odd.iter().for_each(say_odd);
+    let mut reasons = Reasons::default();
+    reasons.doubts.extend(odd.as_ref().map(|odd| match odd.points.len() {
+        1 => "one point is wrong, or its readings".to_owned(),
+        count => format!("{count} points are wrong, or their readings"),
+    }));
+    // Wrong points are none of the robot's errors.
+    let rms_m = odd.as_ref().map_or(model.fit.rms_m, |odd| odd.without.rms_m);
+    let left_out = odd.as_ref().map_or(&[][..], |odd| &odd.points);
+    let different = model.different();
+    if moved.is_some() {
+        reasons.against.push("the points do not belong together".into());
+    } else if different < limits.scatter_images {
+        reasons.against.push(format!(
+            "{different} different points, of which frame and reflector take up nine of {} values: measure {} or more",
+            3 * different,
+            limits.scatter_images
+        ));
+    } else {
+        match nominal.as_ref().map(|nominal| gain(&model, nominal, left_out)) {
+            Some(Some(ratio)) => reasons.add_gain(ratio, "points", limits),
+            Some(None) => reasons.against.push("the nominal model leaves nothing".into()),
+            None => {}
+        }
+        reasons.add_error((&args.urdf, rms_m), expected, nominal.is_some(), limits);
+    }
+    let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
+    reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
+    Ok(reasons.verdict())
+}
+
+/// As stated; nothing where it is not.
+fn point_sigma(stated: Option<f64>, limits: &Limits) -> Result<f64> {
+    match stated.unwrap_or(0.0) {
+        sigma if (0.0..limits.far_points_m).contains(&sigma) => Ok(sigma),
+        sigma => Err(Error::new(
+            Code::OptionRange,
+            "--point-sigma-m",
+            format!("{sigma} is no sigma of points in metres"),
+            "give metres: 0.00005 are 0.05 mm",
+        )),
+    }
+}
+
+/// The error of a model over that of the nominal one, by the points but some.
+fn gain(model: &Judged, nominal: &Judged, left_out: &[usize]) -> Option<Ratio> {
+    let [model, nominal] = [model, nominal].map(|judged| judged.without(left_out));
+    let (model, nominal) = (model?, nominal?);
+    bootstrap_ratio(&units(&model, &model), &units(&model, &nominal))
+}
+
+fn judged(
+    args: &VerifyArgs,
+    (urdf, compensation): (&Path, Option<&Path>),
+    (file, unit): (&Path, Unit),
+) -> Result<Judged> {
+    let chain = read_chain(urdf, args.base.as_deref(), args.tip.as_deref())?;
+    let points = read_points(file, &chain, unit)?;
+    let robot = compensated(chain, compensation)?;
+    Judged::of(robot, points, file)
+}
+
+fn contradict((model, urdf): (&Judged, &Path), file: &Path, why: &str, remedy: &str) -> Error {
+    let what =
+        format!("the points are {:.1} mm RMS from where {} puts them{why}", 1e3 * model.fit.rms_m, urdf.display());
+    Error::new(Code::PointsContradict, file.display(), what, remedy)
+}
+
+fn refuse_mistaken(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Result<()> {
+    let Judged { robot, points, fit, .. } = model;
+    // Of few points everything explains everything.
+    if model.different() < limits.scatter_images || fit.rms_m < limits.displaced_m {
+        return Ok(());
+    }
+    let Some((mistake, left_m)) = reading_mistake(robot, points, fit.rms_m, limits) else { return Ok(()) };
+    let name = |reading: usize| &robot.chain.readings[reading];
+    let undone = match mistake {
+        ReadingMistake::Reversed(joint) => format!("with the other sign of {}", name(joint)),
+        ReadingMistake::Exchanged(a, b) => format!("with {} and {} exchanged", name(a), name(b)),
+    };
+    let why = format!(", and {:.3} mm {undone}", 1e3 * left_m);
+    Err(contradict((model, urdf), file, &why, "correct the columns of the joints"))
+}
+
+fn refuse_far(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Result<()> {
+    if model.fit.rms_m <= limits.far_points_m {
+        return Ok(());
+    }
+    let why = ": no error of a robot, but another robot or other readings";
+    let remedy = "check --joint-unit, the order of the joint columns, and the unit of the points (m)";
+    Err(contradict((model, urdf), file, why, remedy))
+}
+
+fn line(what: &str, urdf: &Path, Judged { fit, .. }: &Judged) -> String {
+    let worst = fit.residuals_m.iter().map(Vector3::norm).fold(0.0, f64::max);
+    format!("{what:<9} {}: {:.3} mm RMS, worst {:.3} mm", urdf.display(), 1e3 * fit.rms_m, 1e3 * worst)
+}
+
+fn say_moved(DeviceMoved { first, by_m, rms_m }: &DeviceMoved) {
+    say_line!(
+        "moved     the device, or the base, stands {:.1} mm elsewhere from row {} on (without that {:.3} mm RMS): judge the rows before and after alone",
+        1e3 * by_m,
+        first + 1,
+        1e3 * rms_m
+    );
+}
+
+fn say_odd(OddPoints { points, off_m, without }: &OddPoints) {
+    let each: Vec<String> =
+        points.iter().zip(off_m).map(|(k, off)| format!("{} ({:.1} mm)", k + 1, 1e3 * off)).collect();
+    say_line!(
+        "odd       row {}: wrong points or readings? Without {:.3} mm RMS: look at them, measure again",
+        each.join(", "),
+        1e3 * without.rms_m
+    );
+}
+
+/// For every point the number of its readings.
+fn clusters(points: &[MeasuredPoint]) -> Vec<usize> {
+    let mut known: HashMap<Vec<u64>, usize> = HashMap::new();
+    let bits = |p: &MeasuredPoint| p.readings.iter().map(|q| q.to_bits()).collect();
+    points
+        .iter()
+        .map(|p| {
+            let next = known.len();
+            *known.entry(bits(p)).or_insert(next)
+        })
+        .collect()
+}
+
+/// Squares of the residuals, those at the same readings together.
+fn units(model: &Judged, judged: &Judged) -> Vec<(f64, f64)> {
+    let squares: Vec<(f64, f64)> = judged.fit.residuals_m.iter().map(|r| (r.norm_squared(), 1.0)).collect();
+    by_cluster(&model.clusters, &squares)
+}
+
+fn read_points(path: &Path, chain: &Chain, unit: Unit) -> Result<Vec<MeasuredPoint>> {
+    let rows = joint_table::read(path, &["x_m", "y_m", "z_m"], chain, (unit, "--joint-unit"))?;
+    let point = |(xyz, readings): (Vec<f64>, Vec<f64>)| MeasuredPoint {
+        position_m: Vector3::from_column_slice(&xyz),
+        readings,
+    };
+    Ok(rows.into_iter().map(point).collect())
+}

@@ -1,0 +1,208 @@
+//! `robotcal verify --series`: a corrected model judged by another series.
+
+use std::path::Path;
+
+use super::compensate_frames::Side;
+use super::compensate_models::not_given;
+use super::verify_args::VerifyArgs;
+use super::verify_stated::Stated;
+use super::verify_verdict::{Reasons, of_series};
+use crate::assess::{Limits, bootstrap_ratio, by_cluster, root_mean_square};
+use crate::calibration::{Ends, Inputs, Observed};
+use crate::cli::Verdict;
+use crate::cli::flags::recording::RecordingArgs;
+use crate::cli::terminal::progress;
+use crate::cli::terminal::say::say_line;
+use crate::error::{Code, Error, Result};
+use crate::identify::{
+    JudgedImage, Options, RobotModel, Selection, identify, in_told_postures, postures_are_computed, verify_series,
+};
+use crate::model::robot::Robot;
+use crate::output::compensated;
+use crate::output::corrections::FileFinding;
+use crate::output::restore::add;
+use crate::problem::MeasuredSeries;
+use crate::series::InputFile;
+use crate::urdf::Chain;
+
+/// Judges the model, and the nominal one where it is given, by the images that both predict.
+pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdict> {
+    let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
+    let read = |urdf: &Path| Inputs::read(urdf, &args.series, ends);
+    let judged_inputs = read(&args.urdf)?;
+    let options = recording.options(&[])?;
+    let Some(file) = &args.nominal else {
+        let inputs = judged_inputs.with_recordings(&options)?;
+        require_readings(&inputs)?;
+        let model = Model::of(args, inputs.chain.clone())?;
+        let Observed { series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
+        let series = with_added(series, &missing(args, &model, &files)?);
+        let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
+        let images: Vec<&JudgedImage> = images.iter().collect();
+        say_line!("{}", line("model", &args.urdf, &images));
+        let mut reasons = Reasons::default();
+        weigh(args, &mut reasons, &model, Measured { series: &series, files: &files, images: &images });
+        return Ok(reasons.verdict());
+    };
+    // Poses of a controller are those of the model that is in it, whichever robot is judged by them.
+    let nominal_inputs = read(file)?;
+    require_same_joints(&judged_inputs.chain, &nominal_inputs.chain, &args.urdf, file)?;
+    let model = Model::of(args, judged_inputs.chain)?;
+    let Observed { chain, series, files, .. } =
+        nominal_inputs.with_recordings(&options)?.observe(&model.limits, &progress::of_series())?;
+    let missing = missing(args, &model, &files)?;
+    let series = in_told_postures(&model.robot, &with_added(series, &missing), &model.limits);
+    let as_shown: Vec<f64> = missing.iter().map(|offset| -offset).collect();
+    let nominal = judged((&Robot::nominal(chain), file), &with_added(series.clone(), &as_shown), &model.limits)?;
+    let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
+    let (images, nominal) = of_both(&images, &nominal);
+    let mut reasons = compare(args, (file, &model.limits), &images, &nominal)?;
+    weigh(args, &mut reasons, &model, Measured { series: &series, files: &files, images: &images });
+    Ok(reasons.verdict())
+}
+
+/// What is judged, with what its solution states and the limits with which that was found.
+struct Model {
+    robot: Robot,
+    stated: Option<Stated>,
+    limits: Limits,
+}
+
+impl Model {
+    fn of(args: &VerifyArgs, chain: Chain) -> Result<Self> {
+        let robot = compensated(chain, args.compensation.as_deref())?;
+        let stated = Stated::beside(&args.urdf, &robot);
+        // A flag that means nothing is refused before images are read.
+        args.readings.beside(stated.as_ref(), &args.urdf, &[])?;
+        Ok(Self { limits: Stated::limits_of(stated.as_ref()), stated, robot })
+    }
+}
+
+/// What is to be added to readings so that they are of the controller to which the model belongs, rad or m; says which they are taken for.
+fn missing(args: &VerifyArgs, model: &Model, files: &[InputFile]) -> Result<Vec<f64>> {
+    let zeros = args.readings.beside(model.stated.as_ref(), &args.urdf, files)?;
+    zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
+    Ok(zeros.map_or_else(Vec::new, |zeros| zeros.missing))
+}
+
+/// The series with this added to all readings, rad or m, those of other postures included.
+fn with_added(mut series: Vec<MeasuredSeries>, offsets: &[f64]) -> Vec<MeasuredSeries> {
+    for s in &mut series {
+        let of_stops = s.stops.iter_mut().filter_map(|stop| stop.readings.as_mut());
+        of_stops.chain(s.postures.iter_mut().flatten()).for_each(|readings| add(readings, offsets));
+    }
+    series
+}
+
+/// What was measured, and how the model does there.
+struct Measured<'a> {
+    series: &'a [MeasuredSeries],
+    files: &'a [InputFile],
+    images: &'a [&'a JudgedImage],
+}
+
+/// The model beside what its solution states, and what the series shows of itself where it misses more.
+fn weigh(args: &VerifyArgs, reasons: &mut Reasons, model: &Model, measured: Measured<'_>) {
+    let Measured { series, files, images } = measured;
+    let Model { robot, stated, limits } = model;
+    let urdf = &args.urdf;
+    let expected = stated.as_ref().and_then(|s| Some((s, s.at_stops(series)?)));
+    let rms_m = 1e-3 * root_mean_square(&units(images));
+    reasons.add_error((urdf, rms_m), expected, args.nominal.is_some(), limits);
+    if let Some(stated) = stated.as_ref().filter(|s| s.was_fitted_to(files)) {
+        reasons.add_own(urdf, stated);
+    }
+    let side = Side { robot, urdf, solution: None };
+    reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
+    let is_unexplained = expected.is_none() && rms_m > 1e-3 * limits.flange_sigma_mm;
+    if reasons.misses() || is_unexplained {
+        reasons.findings.extend(shown_by_series(robot.chain.clone(), series, limits));
+    }
+}
+
+/// What the series shows of itself with the origins of the model held: a plate or a camera that was moved, a zero that is off.
+fn shown_by_series(chain: Chain, series: &[MeasuredSeries], limits: &Limits) -> Vec<FileFinding> {
+    let selection = Selection { fix: vec![ROBOT.to_owned()], ..Selection::default() };
+    let options = Options { model: RobotModel::Rigid, selection, limits: *limits, ..Options::default() };
+    let found = identify(chain, series, &options);
+    found.map_or_else(|_| Vec::new(), |solution| solution.findings.iter().filter_map(of_series).collect())
+}
+
+/// Name of all parameters of the robot.
+const ROBOT: &str = "robot";
+
+/// The images that both models predict.
+fn of_both<'a>(model: &'a [JudgedImage], nominal: &'a [JudgedImage]) -> (Vec<&'a JudgedImage>, Vec<&'a JudgedImage>) {
+    let same = |a: &JudgedImage, b: &JudgedImage| a.series == b.series && a.name == b.name;
+    model.iter().filter_map(|m| nominal.iter().find(|n| same(m, n)).map(|n| (m, n))).unzip()
+}
+
+/// Without the model in the controller its poses tell no readings.
+fn require_readings(inputs: &Inputs) -> Result<()> {
+    let of_poses = inputs.series.iter().find(|s| postures_are_computed(s, &inputs.chain));
+    of_poses.map_or(Ok(()), |s| {
+        let what = "has poses of the controller, and the model by which it computes them is not given: the robot that is judged would reach \
+                    them exactly, whatever its errors";
+        let remedy = "give --nominal, the robot description that the controller computes with";
+        Err(Error::new(Code::OptionMissing, s.readings_file().display(), what, remedy))
+    })
+}
+
+fn require_same_joints(model: &Chain, nominal: &Chain, urdf: &Path, file: &Path) -> Result<()> {
+    if (&model.readings, &model.reading_kinds) == (&nominal.readings, &nominal.reading_kinds) {
+        return Ok(());
+    }
+    let joints = |chain: &Chain| chain.readings.join(", ");
+    let what = format!("has the joints {}, and {} has {}", joints(model), file.display(), joints(nominal));
+    let remedy = "give two descriptions of one robot, and --base and --tip where the same joints stand between them";
+    Err(Error::new(Code::JointUnknown, urdf.display(), what, remedy))
+}
+
+fn compare(
+    args: &VerifyArgs,
+    (file, limits): (&Path, &Limits),
+    model: &[&JudgedImage],
+    nominal: &[&JudgedImage],
+) -> Result<Reasons> {
+    say_line!(
+        "images    {} that both models predict; camera, hand-eye transform and plate fitted to the others",
+        model.len()
+    );
+    say_line!("{}", line("model", &args.urdf, model));
+    say_line!("{}", line("nominal", file, nominal));
+    let postures: Vec<usize> = model.iter().map(|i| i.posture).collect();
+    let of_postures = |images: &[&JudgedImage]| by_cluster(&postures, &units(images));
+    let ratio = bootstrap_ratio(&of_postures(model), &of_postures(nominal)).ok_or_else(|| {
+        Error::new(
+            Code::FitUndetermined,
+            "verification",
+            "the models have no image in common",
+            "check that both URDFs are of this robot",
+        )
+    })?;
+    let mut reasons = Reasons::default();
+    reasons.add_gain(ratio, "images", limits);
+    Ok(reasons)
+}
+
+fn judged((robot, file): (&Robot, &Path), series: &[MeasuredSeries], limits: &Limits) -> Result<Vec<JudgedImage>> {
+    let bar = progress::bar(1, &file.display().to_string());
+    let found = verify_series(robot, series, limits);
+    bar.finish_and_clear();
+    found
+}
+
+fn units(images: &[&JudgedImage]) -> Vec<(f64, f64)> {
+    images.iter().map(|i| (i.error.mm2, i.error.count)).collect()
+}
+
+fn line(what: &str, file: &Path, images: &[&JudgedImage]) -> String {
+    let px: Vec<(f64, f64)> = images.iter().map(|i| (i.error.px2, i.error.count)).collect();
+    let worst = images.iter().map(|i| (i.error.mm2 / i.error.count).sqrt()).fold(0.0, f64::max);
+    format!(
+        "{what:<9} {}: {:.3} mm RMS, {:.3} px RMS, worst image {worst:.3} mm",
+        file.display(),
+        root_mean_square(&units(images)),
+        root_mean_square(&px)
+    )
+}

@@ -1,0 +1,183 @@
+//! What the solution of a description states of it, to be held against another measurement.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector6;
+
+use super::compensate_frames::{Side, solution};
+use crate::assess::{Limits, MeasuredPoint, NORMAL_95, PredictedFlange, fit_points, root_mean_square};
+use crate::cli::results::show::read_solution;
+use crate::model::robot::{Posture, Robot};
+use crate::output::ALONE;
+use crate::output::restore::{FoundModel, exported_model};
+use crate::output::solution_json::{self, SolutionRecord};
+use crate::problem::MeasuredSeries;
+use crate::series::{InputFile, SpatialFiles};
+
+/// The solution from which a description came, with as much of its model as is judged.
+pub(super) struct Stated {
+    pub path: PathBuf,
+    record: SolutionRecord,
+    found: FoundModel,
+    /// What is judged of it where that is not the whole: a URDF without compensation.toml.
+    part: Option<Robot>,
+}
+
+/// What a right model misses in a measurement, RMS.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Expectation {
+    pub rms_m: f64,
+    /// Upper end of the 95 % interval.
+    pub most_m: f64,
+}
+
+/// Files of a series that hold what was measured, beside images and recordings.
+const OBSERVATIONS: &str = "observations.csv";
+/// Ends of the names of images and recordings.
+const RECORDED: [&str; 8] = ["png", "tif", "tiff", "pgm", "jpg", "jpeg", "bmp", "mcap"];
+/// Parameters of frame and reflector, which every fit of points takes up.
+const FITTED: f64 = 9.0;
+/// Folders of images that several series may have in common.
+const FLAT_FIELD: [&str; 2] = ["dark", "white"];
+
+impl Stated {
+    /// That of the solution.json beside a description; `None` where none stands there from which it came.
+    pub fn beside(urdf: &Path, robot: &Robot) -> Option<Self> {
+        let path = urdf.with_file_name(solution_json::FILE_NAME);
+        let side = Side { robot, urdf, solution: None };
+        let (record, is_whole) = match solution(&side, None).ok()?.ok() {
+            Some(record) => {
+                let is_whole = !robot.terms.is_empty() || !record.beyond_urdf();
+                (record, is_whole)
+            }
+            None => (of_urdf_alone(&path, urdf, robot)?, false),
+        };
+        let found = exported_model(&record).ok()?;
+        Some(Self { path, record, found, part: (!is_whole).then(|| robot.clone()) })
+    }
+
+    /// Those with which the solution was judged; where none stands beside a description, the usual ones.
+    pub fn limits_of(stated: Option<&Self>) -> Limits {
+        stated.map_or_else(Limits::default, |s| s.found.limits)
+    }
+
+    /// At the stops of series: markers as far from the flange as what stands still is.
+    pub fn at_stops(&self, series: &[MeasuredSeries]) -> Option<Expectation> {
+        let flange = self.found.flange()?;
+        let stops: Vec<Posture> = series.iter().flat_map(postures).collect();
+        let at: Vec<PredictedFlange> = stops.iter().map(|stop| flange.at(&stop.readings)).collect();
+        let lever_m = |at: &PredictedFlange| at.pose.translation.norm();
+        let of_model = at.iter().map(|at| {
+            let [sigma_m, sigma_rad] = at.sigmas();
+            sigma_m.hypot(sigma_rad * lever_m(at))
+        });
+        let lacking = self.part.iter().flat_map(|part| {
+            let twists = displacements(&self.found.robot, part, &stops);
+            let length = |(t, at): (&Vector6<f64>, &PredictedFlange)| {
+                t.fixed_rows::<3>(0).norm().hypot(t.fixed_rows::<3>(3).norm() * lever_m(at))
+            };
+            twists.iter().zip(&at).map(length).collect::<Vec<_>>()
+        });
+        let [model_m, lacking_m] = [rms(of_model), rms(lacking)];
+        let expected = self.expectation((model_m, lacking_m), self.record.flange?.scatter_m)?;
+        // What was found for images that the fit had not seen is of this kind.
+        let held_out_m = 1e-3 * self.record.accuracy.calibrated.rms_mm;
+        let most_m = if held_out_m.is_finite() { expected.most_m.max(held_out_m) } else { expected.most_m };
+        Some(Expectation { most_m, ..expected })
+    }
+
+    /// Of points, with the sigma per axis of the device, what the fit of frame and reflector takes up left out.
+    pub fn at_points(&self, points: &[MeasuredPoint], device_m: f64) -> Option<Expectation> {
+        let known = self.found.known_robot(None).ok()?;
+        let robot = &self.found.robot;
+        let left = fit_points(robot, points)?.expected(robot, points, known.covariance(), &self.found.joint_sigma)?;
+        let scatter_m = (left.with_joint_noise_m.powi(2) - left.model_m.powi(2)).max(0.0).sqrt();
+        let lacking_m = self.part.as_ref().map_or(Some(0.0), |part| {
+            let on_tip = fit_points(robot, points)?.tip_point_m;
+            let of_whole = |p: &MeasuredPoint| MeasuredPoint {
+                position_m: robot.base_from_tip(&p.readings).transform(&on_tip),
+                readings: p.readings.clone(),
+            };
+            Some(fit_points(part, &points.iter().map(of_whole).collect::<Vec<_>>())?.rms_m)
+        });
+        let expected = self.expectation((left.model_m, lacking_m?), scatter_m)?;
+        // Of so many coordinates, less what frame and reflector take up.
+        let count = points.len() as f64;
+        let freedom = (3.0 * count - FITTED).max(1.0);
+        let device_m = device_m * (freedom / count).sqrt();
+        let most_m = device_m * (1.0 + NORMAL_95 / (2.0 * freedom).sqrt());
+        Some(Expectation { rms_m: expected.rms_m.hypot(device_m), most_m: expected.most_m.hypot(most_m) })
+    }
+
+    /// Of the errors of the model, what a part of it lacks, and the scatter of single stops.
+    fn expectation(&self, (model_m, lacking_m): (f64, f64), scatter_m: f64) -> Option<Expectation> {
+        let flange = self.record.flange?;
+        let widening = flange.intervals.map_or(NORMAL_95, |i| i.model_m[1] / flange.model_m);
+        let with = |model_m: f64| model_m.hypot(scatter_m).hypot(lacking_m);
+        let found = Expectation { rms_m: with(model_m), most_m: with(widening * model_m) };
+        (found.rms_m > 0.0 && found.most_m.is_finite()).then_some(found)
+    }
+
+    /// Whether one of these files of measurements is an input of the solution.
+    pub fn was_fitted_to(&self, files: &[InputFile]) -> bool {
+        files.iter().filter(|file| is_measurement(&file.path)).any(|file| is_input(&self.record, file))
+    }
+
+    /// The solution.
+    pub fn record(&self) -> &SolutionRecord {
+        &self.record
+    }
+}
+
+/// Whether files of measurements are inputs of a solution, one of each folder; `None` where those of some folders are and those of others not.
+pub(super) fn were_fitted_to(record: &SolutionRecord, files: &[InputFile]) -> Option<bool> {
+    let mut folders: BTreeMap<Option<&Path>, bool> = BTreeMap::new();
+    for file in files.iter().filter(|file| is_measurement(&file.path)) {
+        *folders.entry(file.path.parent()).or_default() |= is_input(record, file);
+    }
+    let is_one = folders.values().any(|is_input| *is_input);
+    folders.values().all(|is_input| *is_input == is_one).then_some(is_one)
+}
+
+fn is_input(record: &SolutionRecord, file: &InputFile) -> bool {
+    record.inputs.iter().any(|input| input.sha256 == file.sha256)
+}
+
+fn rms(lengths: impl Iterator<Item = f64>) -> f64 {
+    let squares: Vec<(f64, f64)> = lengths.map(|m| (m * m, 1.0)).collect();
+    if squares.is_empty() { 0.0 } else { root_mean_square(&squares) }
+}
+
+/// How the tip of a second robot stands to that of a first one, without what a tool takes up: body twists.
+fn displacements(a: &Robot, b: &Robot, stops: &[Posture]) -> Vec<Vector6<f64>> {
+    let tip = |robot: &Robot, stop: &Posture| robot.pose_at(stop, &vec![0.0; stop.readings.len()]);
+    let all: Vec<Vector6<f64>> = stops.iter().map(|stop| (tip(a, stop).inverse() * tip(b, stop)).log()).collect();
+    let mean = all.iter().sum::<Vector6<f64>>() / all.len().max(1) as f64;
+    all.into_iter().map(|twist| twist - mean).collect()
+}
+
+/// The stops of a series on the robot, in their order.
+fn postures(series: &MeasuredSeries) -> Vec<Posture> {
+    let all: Vec<&Vec<f64>> = series.stops.iter().filter_map(|stop| stop.readings.as_ref()).collect();
+    let step = |k: usize| Some(all[k].iter().zip(all[k.checked_sub(1)?]).map(|(q, before)| q - before).collect());
+    let approach = |k: usize| if series.order_known { step(k) } else { None };
+    (0..all.len()).map(|k| Posture { readings: all[k].clone(), approach: approach(k) }).collect()
+}
+
+fn is_measurement(path: &Path) -> bool {
+    let text = |part: Option<&std::ffi::OsStr>| part.and_then(|p| p.to_str()).unwrap_or_default().to_lowercase();
+    let (name, end) = (text(path.file_name()), text(path.extension()));
+    let folder = text(path.parent().and_then(Path::file_name));
+    let is_table = name == OBSERVATIONS || SpatialFiles::NAMES.contains(&name.as_str());
+    is_table || (RECORDED.contains(&end.as_str()) && !FLAT_FIELD.contains(&folder.as_str()))
+}
+
+/// The record that lists a URDF for use without compensation.toml, whose origins it does not hold.
+fn of_urdf_alone(path: &Path, urdf: &Path, robot: &Robot) -> Option<SolutionRecord> {
+    let name = urdf.file_name()?.to_str().filter(|name| name.ends_with(ALONE))?;
+    let record = path.is_file().then(|| read_solution(path).ok())??;
+    let chain = &robot.chain;
+    let is_its_robot = chain.readings == record.robot.readings && chain.tip == record.robot.tip;
+    (is_its_robot && record.files.iter().any(|file| file == name)).then_some(record)
+}

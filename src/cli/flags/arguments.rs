@@ -1,0 +1,12 @@
+//! The arguments of the process.
+
+/// Words of the command line as they can be shown: a path may hold bytes that are no text.
+pub fn command_line() -> Vec<String> {
+    std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect()
+}
+
+/// Two numbers with an x between them.
+pub fn pair<T: std::str::FromStr + Copy>(text: &str) -> std::result::Result<[T; 2], String> {
+    let parts: Vec<T> = text.split(['x', 'X']).filter_map(|p| p.trim().parse().ok()).collect();
+    <[T; 2]>::try_from(parts).map_err(|_| "give two numbers with an x between them".to_owned())
+}

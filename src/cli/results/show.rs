@@ -1,0 +1,158 @@
+//! `robotcal show`: a solution printed again, or two solutions against each other.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::at::AtArgs;
+use super::{long_table, summary};
+use crate::cli::Verdict;
+use crate::cli::terminal::say::{say, say_line};
+use crate::cli::terminal::stages;
+use crate::error::{Error, Result};
+use crate::files::{self, FileKind};
+use crate::output::difference::{Difference, compare_solutions};
+use crate::output::solution_json::{self, SolutionRecord};
+use crate::output::verdict;
+use crate::output::{Thumbnails, figure_files, recover, report_html, write_beside};
+use crate::urdf::JointKind;
+
+/// Flags of `show`.
+#[derive(Debug, Args)]
+pub struct ShowArgs {
+    /// solution.json, or the folder that holds it; a second one is compared with it over the workspace
+    #[arg(value_name = "SOLUTION", required = true, num_args = 1..=2)]
+    solutions: Vec<PathBuf>,
+    /// Print the long table: everything that was found, and what was left out
+    #[arg(long)]
+    all: bool,
+    /// Print every parameter with sigma, prior and share of data
+    #[arg(long)]
+    parameters: bool,
+    /// Print the solution as JSON and nothing else
+    #[arg(long, conflicts_with_all = ["all", "parameters", "at"])]
+    json: bool,
+    /// Write report.html again to this file, with pictures of the images that are still there
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Write the figures of the report to this folder as SVG files
+    #[arg(long, value_name = "FOLDER")]
+    figures: Option<PathBuf>,
+    /// Folder for at.csv
+    #[arg(long, value_name = "FOLDER", default_value = ".")]
+    out: PathBuf,
+    #[command(flatten)]
+    at: AtArgs,
+}
+
+/// Reads a solution: the file, or that of a folder of results.
+pub fn read_solution(path: &Path) -> Result<SolutionRecord> {
+    read_solution_with_bytes(path).map(|(record, _)| record)
+}
+
+/// As [`read_solution`], with the bytes of the file.
+pub(super) fn read_solution_with_bytes(path: &Path) -> Result<(SolutionRecord, Vec<u8>)> {
+    let within = path.join(solution_json::FILE_NAME);
+    let path = if path.is_dir() { &within } else { path };
+    recover(path)?;
+    let bytes = files::read(path, FileKind::Solution)?;
+    let record = solution_json::read(&bytes).map_err(|e| Error {
+        place: e.place.replacen(solution_json::FILE_NAME, &path.display().to_string(), 1),
+        ..e
+    })?;
+    Ok((record, bytes))
+}
+
+pub fn run(args: &ShowArgs) -> Result<Verdict> {
+    let first = read_solution(&args.solutions[0])?;
+    if let Some(second) = args.solutions.get(1) {
+        return compare(args, &first, &read_solution(second)?);
+    }
+    let at = args.at.table_for(&first)?;
+    if let Some(file) = &args.report {
+        let page = report_html(&first, &Thumbnails::of_files(first.photogrammetry()));
+        let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let folder = file.parent().unwrap_or(Path::new("."));
+        write_beside(folder, &[(name, page.as_bytes())], &args.solutions)?;
+    }
+    if let Some(folder) = &args.figures {
+        let all = figure_files(&first);
+        let files: Vec<(String, &[u8])> = all.iter().map(|f| (f.name.clone(), f.svg.as_bytes())).collect();
+        write_beside(folder, &files, &args.solutions)?;
+    }
+    if args.json {
+        say!("{}", String::from_utf8_lossy(&solution_json::to_bytes(&first)?));
+        return Ok(verdict_of(&first));
+    }
+    let given = args.solutions[0].as_path();
+    let folder = if given.is_dir() { given } else { given.parent().unwrap_or(Path::new("")) };
+    match args.all || stages::are_told() {
+        true => say!("{}", long_table::text(&first)),
+        false => say!("{}", summary::text(&first, folder)),
+    }
+    if args.parameters {
+        say!("{}", long_table::parameters(&first));
+    }
+    if let Some(at) = at {
+        say!("{}", at.run(&first, &args.out)?);
+    }
+    Ok(verdict_of(&first))
+}
+
+fn verdict_of(r: &SolutionRecord) -> Verdict {
+    if r.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed }
+}
+
+fn compare(args: &ShowArgs, a: &SolutionRecord, b: &SolutionRecord) -> Result<Verdict> {
+    let found = compare_solutions(a, b)?;
+    say_line!("first     {}", args.solutions[0].display());
+    say_line!("second    {}", args.solutions[1].display());
+    say_line!(
+        "flange    distance of the flange between the two models, base frames and a point of the flange brought together:"
+    );
+    match &found.covered {
+        Some(d) => print_difference("in the region of the stops", d, a),
+        None => say_line!("          their stops have no region in common"),
+    }
+    print_difference("within all joint limits", &found.everywhere, a);
+    let apart = |(name, (zero, kind)): (&String, (&f64, &JointKind))| {
+        let [_, unit] = kind.units();
+        (*zero != 0.0).then(|| format!("{name} {:+.3} {unit}", 1e3 * zero))
+    };
+    let kinds = &a.robot.reading_kinds;
+    let zeros: Vec<String> = a.robot.readings.iter().zip(found.zeros.iter().zip(kinds)).filter_map(apart).collect();
+    if !zeros.is_empty() {
+        say_line!(
+            "zeros     the two corrected URDFs take different joint angles (mastering.csv): one posture reads {} more for the second; do not exchange them",
+            zeros.join(", ")
+        );
+    }
+    if found.parameters.is_empty() {
+        say_line!("differ    no parameter of the robot differs by more than 3 sigmas");
+    }
+    for (name, x, y, sigmas) in &found.parameters {
+        say_line!("differ    {name}: {x:.3e} and {y:.3e}, {sigmas:.1} sigmas");
+    }
+    let words = |r: &SolutionRecord| summary::in_words(&verdict::Verdict::of(r));
+    for (what, r) in [("first", a), ("second", b)] {
+        say_line!("accuracy  {what}: {:.3} mm held out ({})", r.accuracy.calibrated.rms_mm, words(r));
+    }
+    Ok(Verdict::Good)
+}
+
+fn print_difference(region: &str, d: &Difference, a: &SolutionRecord) {
+    let stated = d.stated_m.map_or(String::new(), |s| format!(", stated sigma of both {:.3} mm", 1e3 * s));
+    say_line!(
+        "          {region}: {:.3} mm RMS, worst {:.3} mm over {} places{stated}",
+        1e3 * d.rms_m,
+        1e3 * d.worst_m,
+        d.places
+    );
+    let at: Vec<String> = (d.worst_at.iter().zip(&a.robot.readings).zip(&a.robot.reading_kinds))
+        .map(|((q, name), kind)| match kind {
+            JointKind::Prismatic => format!("{name} {:.0} mm", 1e3 * q),
+            _ => format!("{name} {:.0} deg", q.to_degrees()),
+        })
+        .collect();
+    say_line!("          worst at {}", at.join(", "));
+}

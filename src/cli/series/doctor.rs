@@ -1,0 +1,219 @@
+//! `robotcal doctor`: what is missing in a series folder, before the long work.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use rayon::prelude::*;
+
+use crate::assess::Limits;
+use crate::calibration::{Ends, Inputs};
+use crate::cli::Verdict;
+use crate::cli::terminal::paragraph::paragraph;
+use crate::cli::terminal::say::say_line;
+use crate::detect::load;
+use crate::error::{Code, Error, Notice, Result};
+use crate::files::{is_whole, picture_size};
+use crate::identify::readings_of;
+use crate::series::{self, Series, Source};
+
+/// Most lines of a notice.
+const MOST_LINES: usize = 6;
+
+/// Flags of `doctor`.
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// Series folder, or recording
+    #[arg(value_name = "SERIES")]
+    series: PathBuf,
+    /// Robot description (URDF): also tries whether joint names and readings fit it
+    #[arg(long, value_name = "FILE")]
+    urdf: Option<PathBuf>,
+}
+
+/// What was looked at, and what was found of it.
+#[derive(Default)]
+struct Examination {
+    missing: Vec<Error>,
+}
+
+impl Examination {
+    fn good(&self, what: &str, found: &str) {
+        say_line!("ok        {what}: {found}");
+    }
+
+    fn missing(&mut self, error: Error) {
+        let words = format!("{}: {} ({})", error.place, error.what, error.remedy);
+        paragraph("TO DO     ", &words, MOST_LINES).iter().for_each(|line| say_line!("{line}"));
+        self.missing.push(error);
+    }
+
+    fn note(&self, notice: &Notice) {
+        paragraph("note      ", &notice.coded(), MOST_LINES).iter().for_each(|line| say_line!("{line}"));
+    }
+}
+
+pub fn run(args: &DoctorArgs) -> Result<Verdict> {
+    let mut seen = Examination::default();
+    files_of(&args.series, &mut seen);
+    if seen.missing.is_empty() {
+        match series::read(&args.series) {
+            Ok(series) => examine(&series, args, &mut seen),
+            Err(error) => seen.missing(error),
+        }
+    }
+    match seen.missing.first() {
+        None => {
+            let urdf = args.urdf.as_ref().map_or("robot.urdf".to_owned(), |f| f.display().to_string());
+            say_line!("ready     robotcal identify --urdf {urdf} --series {}", args.series.display());
+            Ok(Verdict::Good)
+        }
+        Some(first) => {
+            let what = format!("is not ready: {} to do, see above", seen.missing.len());
+            Err(Error::new(first.code, args.series.display(), what, "complete the folder, then run doctor again"))
+        }
+    }
+}
+
+/// All files of a folder that are needed and not there; a recording is read as a whole.
+fn files_of(folder: &Path, seen: &mut Examination) {
+    if folder.is_file() || series::is_recording(folder) {
+        return;
+    }
+    if !folder.is_dir() {
+        return seen.missing(Error::new(
+            Code::SeriesMissing,
+            folder.display(),
+            "is no folder",
+            "name the folder of a series",
+        ));
+    }
+    let has = |name: &str| folder.join(name).exists();
+    let mut need = |name: &str, remedy: &str| {
+        if !has(name) {
+            seen.missing(Error::new(Code::FileMissing, folder.join(name).display(), "is not there", remedy));
+        }
+    };
+    need(
+        "series.toml",
+        "write it: format = 1, joint_unit = \"deg\" or \"rad\", camera_mount = \"hand\" or \"fixed\", plate = \"plate.toml\", a line each",
+    );
+    if !has("series.toml") {
+        need("plate.toml", "copy it from the folder that robotcal plate wrote, with plate.csv");
+    }
+    let text = std::fs::read_to_string(folder.join("series.toml")).unwrap_or_default();
+    let is_recording = text.lines().any(|line| line.trim_start().starts_with("mcap"));
+    if is_recording || has("controller.csv") {
+        return;
+    }
+    if !has("controller.csv") {
+        need(
+            "joints.csv",
+            "a row each image: its name, then the reading of every joint; the columns are named as in the URDF",
+        );
+    }
+    if !["images", "images.csv", "observations.csv", "points.csv", "poses.csv", "contacts.csv"]
+        .iter()
+        .any(|name| has(name))
+    {
+        need("images", "put the images of the series there, named as in joints.csv");
+    }
+}
+
+fn examine(series: &Series, args: &DoctorArgs, seen: &mut Examination) {
+    let manifest = series.manifest_file();
+    let manifest = manifest.file_name().map_or_else(|| "series.toml".into(), |name| name.to_string_lossy());
+    seen.good(&manifest, &format!("plate of {} markers", series.plate.markers.len()));
+    match &series.source {
+        Source::Recording(path) => {
+            seen.good("recording", &format!("{}; stops are taken out by identify", path.display()))
+        }
+        Source::Observations(all) => seen.good("observations.csv", &format!("{} images", all.len())),
+        Source::Cameras(views) => {
+            seen.good("images.csv", &format!("{} cameras at the same stops", views.len()));
+            views.iter().for_each(|view| images(view, seen));
+        }
+        Source::NoImages => seen.good("measurements", "of the tip in space, without images"),
+        Source::Images { dark, white, .. } => {
+            images(series, seen);
+            for (name, files) in [("dark/", dark), ("white/", white)] {
+                if !files.is_empty() {
+                    seen.good(name, &format!("{} images for the flat field", files.len()));
+                }
+            }
+        }
+    }
+    series.notices.iter().for_each(|n| seen.note(n));
+    if !matches!(series.source, Source::Recording(_)) {
+        stops(series, seen);
+    }
+    if let Some(urdf) = &args.urdf
+        && let Err(error) = robot(series, urdf, seen)
+    {
+        seen.missing(error);
+    }
+}
+
+/// All pictures can be opened, and have one size.
+fn images(series: &Series, seen: &mut Examination) {
+    let paths: Vec<&PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.as_ref()).collect();
+    let sizes: Vec<Result<(u32, u32)>> = paths.par_iter().map(|path| size_of(path)).collect();
+    let mut known: Vec<(u32, u32)> = Vec::new();
+    for size in sizes {
+        match size {
+            Ok(size) => known.push(size),
+            Err(e) => seen.note(&Notice::new(e.code, e.place, format!("{}; the image is left out", e.what), e.remedy)),
+        }
+    }
+    let Some(&(width, height)) = known.first() else {
+        let what = "no image can be read";
+        return seen.missing(Error::new(
+            Code::ImagesMissing,
+            series.folder.display(),
+            what,
+            "copy the images into images/",
+        ));
+    };
+    let others = known.iter().filter(|size| **size != (width, height)).count();
+    seen.good("images", &format!("{} of {width} x {height} px", known.len() - others));
+    if others > 0 {
+        let what = format!("{others} images have another size than {width} x {height} px");
+        seen.note(&Notice::new(Code::ImageSizeDiffers, "images", what, "they are left out"));
+    }
+}
+
+/// Of a picture that can be used: one without a mark of its end may have all of its rows, and is decoded.
+fn size_of(path: &Path) -> Result<(u32, u32)> {
+    let size = picture_size(path)?;
+    if !is_whole(path)? {
+        load(path, None)?;
+    }
+    Ok(size)
+}
+
+fn stops(series: &Series, seen: &mut Examination) {
+    let (all, few) = (series.stops.stops.len(), Limits::default().few_images);
+    match all < few {
+        false if series.controller.is_some() => seen.good("controller.csv", &format!("{all} stops with their poses")),
+        false => seen.good("joints.csv", &format!("{all} stops, joints {}", series.stops.joints.join(", "))),
+        true => {
+            let remedy = "take 30 to 50 stops that move every joint through its range";
+            seen.note(&Notice::new(Code::FewImages, "joints.csv", format!("{all} stops are few"), remedy));
+        }
+    }
+}
+
+/// Names, units and limits of the readings against the robot.
+fn robot(series: &Series, file: &Path, seen: &Examination) -> Result<()> {
+    let Inputs { description, chain, tip_notice, .. } =
+        Inputs::with_series(file, vec![series.clone()], Ends::default())?;
+    let moving = chain.readings.join(", ");
+    seen.good("urdf", &format!("{} ({} to {}; {moving})", description.name, chain.base, chain.tip));
+    tip_notice.iter().chain(&description.notices).for_each(|n| seen.note(n));
+    if matches!(series.source, Source::Recording(_)) {
+        return Ok(());
+    }
+    let readings = readings_of(series, &chain)?;
+    series.reading_notices(&chain).iter().for_each(|n| seen.note(n));
+    seen.good("readings", &format!("{} stops with a value for every joint", readings.iter().flatten().count()));
+    Ok(())
+}
