@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-use super::covariance::Covariance;
-use super::fit::Fit;
+use super::elimination::system::{Elimination, Singular, System};
 use super::linear::{LinearProblem, Linearised};
 use super::linearised_adjustment::LinearisedAdjustment;
+use super::optimum::covariance::Covariance;
+use super::optimum::fit::Fit;
 use super::status::Status;
-use super::system::{Elimination, Singular, System};
 use crate::linalg::SymmetricFactor;
 use crate::problem::{Adjustment, State, Step};
 

@@ -2,7 +2,7 @@
 
 /// So many places from one on go to those from another on.
 #[derive(Debug, Clone)]
-pub(super) struct Run {
+pub struct Run {
     /// First place that something is taken from.
     pub from: usize,
     /// First place that it goes to.

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 /// Covariance of what a fit says at one stop.
 #[derive(Debug, Clone)]
-pub(super) struct StopCovariance {
+pub struct StopCovariance {
     /// Of what is latent: errors of its readings, then the ties of its images.
     pub latents: DMatrix<f64>,
     /// Of where each measured body is, as body twists of the pose, m and rad.

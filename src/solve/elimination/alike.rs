@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::linear::LinearStop;
+use crate::solve::linear::LinearStop;
 
 /// Most stops or markers of a group, and as many in all groups but the last. Fewer make products too short, more have less in common.
 pub(super) const MOST: usize = 24;

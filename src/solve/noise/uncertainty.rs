@@ -4,11 +4,11 @@
 
 use nalgebra::DMatrix;
 
-use super::fit::Fit;
+use super::information::NoiseInformation;
 use super::latent::Latent;
-use super::noise_information::NoiseInformation;
 use super::tally::JOINT_NOISE_FLOOR;
 use crate::linalg::{SymmetricFactor, product};
+use crate::solve::optimum::fit::Fit;
 
 /// Standard deviation of the logarithm of a variance up to which terms of second order mean anything; what the data do not tell at all, as
 /// the local error of a joint that never moved, would else be stated as an error of any size.

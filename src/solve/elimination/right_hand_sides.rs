@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, Vector2, Vector6};
 
-use super::linear::{BodyPart, LinearImage, LinearProblem};
 use super::seen_markers::SeenMarkers;
 use crate::problem::{E, Equations};
+use crate::solve::linear::{BodyPart, LinearImage, LinearProblem};
 
 /// Right-hand sides of all unknowns before any is eliminated, one column each.
-pub(super) struct RightHandSides {
+pub struct RightHandSides {
     /// Of the dense columns.
     pub dense: DMatrix<f64>,
     /// Of the markers that were seen, three rows each.
@@ -66,7 +66,7 @@ impl RightHandSides {
 }
 
 /// What one image says: the products of its equations with some columns.
-pub(super) struct OfImage {
+pub struct OfImage {
     /// 6 x columns.
     pose: DMatrix<f64>,
     /// Of the intrinsics, field included.

@@ -7,16 +7,16 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, Vector6};
 
-use super::linear::LinearProblem;
 use crate::linalg::{add_combination, columns_product, product, transposed_product_with, wide};
 use crate::problem::Layout;
+use crate::solve::linear::LinearProblem;
 
 /// Unknowns that are latent at the stop of an image, and how each moves its pose.
 type ByLatents = Vec<(usize, Vector6<f64>)>;
 
 /// `T`, rows of the space x unknowns: the dense columns, then what is latent at the stops.
 #[derive(Debug, Clone)]
-pub(super) struct PoseSpace {
+pub struct PoseSpace {
     /// Dense columns that move poses.
     columns: Vec<usize>,
     /// Of the poses by these, 6 images x columns.

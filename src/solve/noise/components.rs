@@ -7,12 +7,12 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::acceleration::Acceleration;
 use super::body_components::{BodyTally, update_bodies};
-use super::fit::Fit;
-use super::levenberg::{Minimised, Outcome, Settings, minimise, minimise_near, minimise_with_priors};
-use super::linear::{LinearImage, LinearStop};
-use super::status::Status;
 use super::tally::JOINT_NOISE_FLOOR;
 use crate::problem::{Adjustment, Noise, Problem};
+use crate::solve::levenberg::{Minimised, Outcome, Settings, minimise, minimise_near, minimise_with_priors};
+use crate::solve::linear::{LinearImage, LinearStop};
+use crate::solve::optimum::fit::Fit;
+use crate::solve::status::Status;
 
 /// What is estimated and how long.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -88,7 +88,7 @@ impl Tally {
 
 /// What is latent at the stops tells of each size.
 #[derive(Debug, Clone)]
-pub(super) struct Tallies {
+pub struct Tallies {
     /// In the order of [`Noise::latent_sizes`].
     all: Tally,
     series: usize,

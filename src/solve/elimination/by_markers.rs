@@ -12,7 +12,6 @@ use rayon::prelude::*;
 
 use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT};
 use super::distances::Distances;
-use super::linear::{Carried, LinearImage, LinearPose, LinearProblem, LinearStop};
 use super::marker_rows::{ImageRows, MarkerBlock, MarkerRows, times_right};
 use super::pose_space::PoseSpace;
 use super::right_hand_sides::RightHandSides;
@@ -20,10 +19,11 @@ use super::seen_markers::SeenMarkers;
 use crate::linalg::{mirror_upper, orthonormal, product};
 use crate::model::plate_modes::MODES;
 use crate::problem::Step;
+use crate::solve::linear::{Carried, LinearImage, LinearPose, LinearProblem, LinearStop};
 
 /// Every marker that was seen, with its elimination.
 #[derive(Debug, Clone)]
-pub(super) struct MarkersEliminated {
+pub struct MarkersEliminated {
     seen: SeenMarkers,
     /// First unknown of what is latent at each stop in use.
     pub latent_start: Vec<usize>,

@@ -1,12 +1,12 @@
 //! What is latent and has a variance that the data decide.
 
-use super::linear::LinearStop;
 use crate::problem::Adjustment;
+use crate::solve::linear::LinearStop;
 
 /// One latent: row in the covariance, standard deviation, sizes with their shares of its variance, by their places among
 /// [`crate::problem::Noise::latent_sizes`].
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Latent {
+pub struct Latent {
     pub row: usize,
     pub sigma: f64,
     pub parts: [(usize, f64); 2],

@@ -5,10 +5,10 @@
 //! S. Self, K.-Y. Liang 1987).
 
 use super::components::ComponentOptions;
-use super::levenberg::{Ended, Outcome, Settings, solve};
-use super::noise_information::{NoiseInformation, noise_information};
+use super::information::{NoiseInformation, noise_information};
 use super::tally::JOINT_NOISE_FLOOR;
 use crate::problem::Adjustment;
+use crate::solve::levenberg::{Ended, Outcome, Settings, solve};
 
 /// Sigmas of an estimate where there is no noise that it must reach: one of a hundred robots without noise gets past.
 const IDENTIFIED: f64 = 2.326;

@@ -14,14 +14,14 @@ use super::alike::alike;
 use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, latents_with_markers};
 use super::body_stops::{BodyStops, touched};
 use super::group::{Group, union};
-use super::linear::Carried;
-use super::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
 use super::seen_markers::SeenMarkers;
 use super::stop_covariance::StopCovariance;
 use crate::linalg::{gram, inverse_factor, mirror_upper, orthonormal, product};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Equations, Step};
+use crate::solve::linear::Carried;
+use crate::solve::linear::{LinearImage, LinearPose, LinearProblem, LinearStop};
 
 /// What moves a marker with the modes of a plate.
 type Modes = SMatrix<f64, 3, MODES>;
@@ -51,7 +51,7 @@ struct Through {
 
 /// Every stop in use with its elimination.
 #[derive(Debug, Clone)]
-pub(super) struct StopsEliminated {
+pub struct StopsEliminated {
     /// Stops with images, ascending.
     blocks: Vec<Block>,
     /// Their places, those together that show much the same markers.

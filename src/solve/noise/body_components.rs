@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, Matrix6};
 
-use super::fit::Fit;
-use super::linear::LinearStop;
 use crate::problem::Noise;
+use crate::solve::linear::LinearStop;
+use crate::solve::optimum::fit::Fit;
 
 /// Weight, in coordinates, with which a stated sigma is believed: 95 % of the factor lie between 1/2 and 2 before the data.
 const STATED: f64 = 4.0;

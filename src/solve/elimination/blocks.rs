@@ -4,17 +4,17 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView};
 
-use super::linear::{BodyPart, LinearImage, LinearProblem, StopParts};
 use super::marker_rows::{ImageRows, MarkerRows};
 use super::seen_markers::SeenMarkers;
 use crate::linalg::{add_combination, product};
 use crate::problem::{Equations, Layout};
+use crate::solve::linear::{BodyPart, LinearImage, LinearProblem, StopParts};
 
 /// Stops whose equations are taken together.
-pub(super) const STOPS_A_PRODUCT: usize = 48;
+pub const STOPS_A_PRODUCT: usize = 48;
 
 /// Coupling of the free dense columns with the markers that were seen.
-pub(super) struct DenseCoupling {
+pub struct DenseCoupling {
     /// The free columns.
     free: Vec<usize>,
     /// How many of them act through the camera poses.
@@ -84,7 +84,7 @@ pub(super) fn latents_with_markers(l: &DMatrix<f64>, equations: &Equations) -> (
 }
 
 /// The equations of the images and measured bodies of some stops in the space of their poses, six rows each, images first.
-pub(super) struct PoseRows<'a> {
+pub struct PoseRows<'a> {
     linear: LinearProblem<'a>,
     images: Range<usize>,
     bodies: Range<usize>,

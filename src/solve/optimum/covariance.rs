@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-use super::linear::{LinearProblem, LinearStop};
-use super::right_hand_sides::RightHandSides;
-use super::stop_covariance::StopCovariance;
-use super::system::{Elimination, Singular, System};
 use crate::linalg::SymmetricFactor;
 use crate::problem::{Problem, Step};
+use crate::solve::elimination::right_hand_sides::RightHandSides;
+use crate::solve::elimination::stop_covariance::StopCovariance;
+use crate::solve::elimination::system::{Elimination, Singular, System};
+use crate::solve::linear::{LinearProblem, LinearStop};
 
 /// Covariance of the reduced unknowns (dense columns, then latents or markers), with what is needed for the eliminated family.
 #[derive(Debug, Clone)]
@@ -55,7 +55,7 @@ fn fixed_are_known(problem: &Problem, reduced: &mut DMatrix<f64>) {
 
 impl Covariance {
     /// From the factor of a system.
-    pub(super) fn of(problem: &Problem, system: System, factor: SymmetricFactor) -> Self {
+    pub(in crate::solve) fn of(problem: &Problem, system: System, factor: SymmetricFactor) -> Self {
         let mut reduced = factor.inverse();
         fixed_are_known(problem, &mut reduced);
         let log_determinant = factor.log_determinant();
@@ -63,7 +63,7 @@ impl Covariance {
     }
 
     /// Steps for right-hand sides of their own.
-    pub(super) fn steps(&self, linear: LinearProblem, of: &RightHandSides) -> Vec<Step> {
+    pub(in crate::solve) fn steps(&self, linear: LinearProblem, of: &RightHandSides) -> Vec<Step> {
         self.system.steps(linear, &self.factor, of)
     }
 
@@ -109,7 +109,7 @@ impl Covariance {
     }
 
     /// Covariances of what is latent and of measured bodies at each of some stops.
-    pub(super) fn at_stops(&self, stops: &[LinearStop]) -> Vec<StopCovariance> {
+    pub(in crate::solve) fn at_stops(&self, stops: &[LinearStop]) -> Vec<StopCovariance> {
         self.system.stop_covariances(&self.reduced, stops)
     }
 

@@ -6,13 +6,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::covariance::Covariance;
-use super::fit::Fit;
 use super::latent::{Latent, local_latents, stop_latents};
-use super::system::Elimination;
 use super::tally::{JOINT_NOISE_FLOOR, SHRINKAGE};
 use crate::linalg::SymmetricFactor;
 use crate::problem::{Adjustment, Family, Noise, Problem};
+use crate::solve::elimination::system::Elimination;
+use crate::solve::optimum::covariance::Covariance;
+use crate::solve::optimum::fit::Fit;
 use crate::urdf::JointKind;
 
 /// Latents up to which those of different stops are taken together; of more, their coupling through the parameters is
@@ -200,7 +200,7 @@ fn draw_together(
 }
 
 impl NoiseInformation {
-    /// Without what it would need for [`super::NoiseUncertainty`].
+    /// Without what it would need for [`crate::solve::NoiseUncertainty`].
     pub fn of_sizes(self) -> Self {
         Self { together: Vec::new(), coupled: None, ..self }
     }

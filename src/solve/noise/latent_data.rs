@@ -9,11 +9,11 @@ use rayon::prelude::*;
 
 use super::acceleration::Acceleration;
 use super::components::ComponentOptions;
-use super::fit::Fit;
 use super::latent::{Latent, local_latents, stop_latents};
-use super::linear::LinearStop;
 use super::tally::{JOINT_NOISE_FLOOR, Tallies};
 use crate::problem::Noise;
+use crate::solve::linear::LinearStop;
+use crate::solve::optimum::fit::Fit;
 use crate::urdf::JointKind;
 
 /// Relative change of every size below which the rounds end.
@@ -38,7 +38,7 @@ struct OfData {
 }
 
 /// What the data say of everything latent.
-pub(super) struct LatentData {
+pub struct LatentData {
     all: Vec<OfData>,
     /// Variances of the sizes that it was found with.
     variances: Vec<f64>,

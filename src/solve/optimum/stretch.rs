@@ -3,11 +3,11 @@
 
 use nalgebra::Vector6;
 
-use super::linear::{BodyPart, LinearProblem};
-use super::right_hand_sides::RightHandSides;
-use super::seen_markers::SeenMarkers;
-use super::system::System;
 use crate::problem::{MeasuredLength, Step};
+use crate::solve::elimination::right_hand_sides::RightHandSides;
+use crate::solve::elimination::seen_markers::SeenMarkers;
+use crate::solve::elimination::system::System;
+use crate::solve::linear::{BodyPart, LinearProblem};
 
 /// What measures lengths, beside plates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

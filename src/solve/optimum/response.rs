@@ -15,15 +15,15 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector, Vector2, Vector6};
 use rayon::prelude::*;
 
-use super::blocks::STOPS_A_PRODUCT;
 use super::covariance::Covariance;
 use super::fit::Fit;
-use super::linear::{LinearImage, LinearProblem};
-use super::right_hand_sides::{OfImage, RightHandSides};
-use super::seen_markers::SeenMarkers;
-use super::system::Singular;
 use crate::linalg::product;
 use crate::problem::{E, Equations, Step};
+use crate::solve::elimination::blocks::STOPS_A_PRODUCT;
+use crate::solve::elimination::right_hand_sides::{OfImage, RightHandSides};
+use crate::solve::elimination::seen_markers::SeenMarkers;
+use crate::solve::elimination::system::Singular;
+use crate::solve::linear::{LinearImage, LinearProblem};
 
 /// Response to some columns.
 #[derive(Debug, Clone)]

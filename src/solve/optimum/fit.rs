@@ -3,8 +3,8 @@
 use std::ops::{Deref, DerefMut};
 
 use super::covariance::Covariance;
-use super::linear::{LinearProblem, Linearised};
 use crate::problem::Adjustment;
+use crate::solve::linear::{LinearProblem, Linearised};
 
 /// An adjustment at its optimum, with everything that is known there.
 #[derive(Debug, Clone)]

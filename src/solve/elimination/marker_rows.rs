@@ -8,24 +8,24 @@ use nalgebra::{DMatrix, Matrix3};
 use rayon::prelude::*;
 
 use super::alike::MOST;
-use super::linear::LinearImage;
 use super::runs::{Run, runs};
 use super::seen_markers::SeenMarkers;
 use crate::linalg::{
     COLUMNS_A_BLOCK, add_combination, mirror_upper, part_of_gram, product_with_rows, transposed_product, wide,
 };
 use crate::problem::{E, Equations, Sight};
+use crate::solve::linear::LinearImage;
 
 /// Coupling of some unknowns with the markers that were seen, unknowns x 3 markers.
 #[derive(Debug, Clone)]
-pub(super) struct MarkerRows {
+pub struct MarkerRows {
     rows: usize,
     pub blocks: Vec<MarkerBlock>,
 }
 
 /// The same with some markers.
 #[derive(Debug, Clone)]
-pub(super) struct MarkerBlock {
+pub struct MarkerBlock {
     /// Their numbers among those that were seen.
     pub markers: Range<usize>,
     /// Rows that are not zero, from their places here to those among all unknowns.
@@ -35,7 +35,7 @@ pub(super) struct MarkerBlock {
 }
 
 /// The equations of an image of a plate, and the rows of its unknowns.
-pub(super) struct ImageRows<'a> {
+pub struct ImageRows<'a> {
     pub plate: usize,
     pub equations: &'a Equations,
     /// The first of the six of its pose.

@@ -9,11 +9,11 @@ use nalgebra::{DMatrix, DVector, Vector6};
 use rayon::prelude::*;
 
 use super::group::Group;
-use super::linear::{BodyPart, LinearPose, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
 use super::stop_covariance::StopCovariance;
 use crate::linalg::{self, add_gram, dot, inverse_factor, product};
 use crate::problem::{Chained, Layout, Step};
+use crate::solve::linear::{BodyPart, LinearPose, LinearProblem, LinearStop};
 
 /// Stops whose equations are taken together: those after each other touch much the same columns.
 const TOGETHER: usize = 48;
@@ -36,7 +36,7 @@ struct Block {
 
 /// Such stops, ascending.
 #[derive(Debug, Clone)]
-pub(super) struct BodyStops(Vec<Block>);
+pub struct BodyStops(Vec<Block>);
 
 /// The free columns that move any of some poses, ascending.
 pub(super) fn touched<'a>(layout: &Layout, chains: impl Iterator<Item = &'a Chained>) -> Vec<usize> {

@@ -12,12 +12,12 @@
 
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3};
 
-use super::linear::LinearProblem;
 use crate::linalg::product;
+use crate::solve::linear::LinearProblem;
 
 /// Measured distances, with markers eliminated or not.
 #[derive(Debug, Clone)]
-pub(super) struct Distances {
+pub struct Distances {
     /// `W`, reduced unknowns x distances.
     by_reduced: DMatrix<f64>,
     /// `U`, 3 markers x distances; no rows where the markers stay.
@@ -129,7 +129,7 @@ impl Distances {
 
 /// Part of measured distances in the covariance of markers: these follow the reduced unknowns by `D' = d' T + K' W'`, with the `d` of the
 /// images and `K = S^-1 U' F^-1`.
-pub(super) struct WithMarkers<'a> {
+pub struct WithMarkers<'a> {
     distances: &'a Distances,
     /// `T cov(x) W`.
     moved: DMatrix<f64>,

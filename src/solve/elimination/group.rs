@@ -6,7 +6,7 @@ use super::runs::{Run, runs};
 use crate::linalg::add_gram;
 
 /// The unknowns that some stops touch between them.
-pub(super) struct Group {
+pub struct Group {
     /// Ascending.
     rows: Vec<usize>,
     /// From their places here to those among all unknowns.

@@ -13,12 +13,12 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::covariance::Covariance;
 use super::frame::{Frame, frames};
-use super::linear::{LinearImage, LinearProblem};
-use super::seen_markers::SeenMarkers;
-use super::system::{Eliminated, Elimination, Singular, System};
 use crate::error::{Code, Error, Result};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Adjustment, Problem, SCALE};
+use crate::solve::elimination::seen_markers::SeenMarkers;
+use crate::solve::elimination::system::{Eliminated, Elimination, Singular, System};
+use crate::solve::linear::{LinearImage, LinearProblem};
 
 /// Covariance with the plates held in their frames.
 #[derive(Debug, Clone)]

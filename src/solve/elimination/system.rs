@@ -7,13 +7,13 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use super::by_markers::MarkersEliminated;
 use super::by_stops::StopsEliminated;
 use super::distances::Distances;
-use super::linear::{Carried, LinearProblem, LinearStop};
 use super::right_hand_sides::RightHandSides;
 use super::seen_markers::SeenMarkers;
 use super::stop_covariance::StopCovariance;
 use crate::linalg::{NotPositiveDefinite, SymmetricFactor};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Adjustment, Length, Problem, Step};
+use crate::solve::linear::{Carried, LinearProblem, LinearStop};
 
 /// Which family of unknowns is eliminated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,7 +37,7 @@ impl Elimination {
 
 /// What is needed to get the eliminated family back.
 #[derive(Debug, Clone)]
-pub(super) enum Eliminated {
+pub enum Eliminated {
     Markers(Box<MarkersEliminated>),
     Stops(StopsEliminated),
 }
@@ -52,7 +52,7 @@ pub struct System {
     /// First unknown of what is latent at each stop in use; empty where that was eliminated.
     pub latent_start: Vec<usize>,
     touched: Vec<bool>,
-    pub(super) eliminated: Eliminated,
+    pub(in crate::solve) eliminated: Eliminated,
     distances: Distances,
 }
 
@@ -85,7 +85,7 @@ impl System {
     }
 
     /// The information of images and priors alone, without right-hand sides.
-    pub(super) fn without_distances(which: Elimination, linear: LinearProblem, lambda: f64) -> Self {
+    pub(in crate::solve) fn without_distances(which: Elimination, linear: LinearProblem, lambda: f64) -> Self {
         let problem = &linear.adjustment.problem;
         let (information, eliminated) = match which {
             Elimination::Markers => {
@@ -115,7 +115,7 @@ impl System {
     }
 
     /// Adds the information of the measured distances; with the orthonormal combinations of markers that are held where markers stay.
-    pub(super) fn add_distances(&mut self, linear: LinearProblem, held: Option<&DMatrix<f64>>) {
+    pub(in crate::solve) fn add_distances(&mut self, linear: LinearProblem, held: Option<&DMatrix<f64>>) {
         if linear.lin.distances.is_empty() {
             return;
         }
@@ -241,7 +241,7 @@ impl System {
     }
 
     /// Says of the first columns whether anything touches them.
-    pub(super) fn set_touched(&mut self, touched: impl Iterator<Item = bool>) {
+    pub(in crate::solve) fn set_touched(&mut self, touched: impl Iterator<Item = bool>) {
         self.touched.iter_mut().zip(touched).for_each(|(slot, touched)| *slot = touched);
     }
 
@@ -254,7 +254,12 @@ impl System {
     }
 
     /// Steps for right-hand sides of their own, from the factor of the information: those of the linearisation take no part.
-    pub(super) fn steps(&self, linear: LinearProblem, factor: &SymmetricFactor, of: &RightHandSides) -> Vec<Step> {
+    pub(in crate::solve) fn steps(
+        &self,
+        linear: LinearProblem,
+        factor: &SymmetricFactor,
+        of: &RightHandSides,
+    ) -> Vec<Step> {
         let columns = &linear.adjustment.problem.layout.columns;
         let solve = |mut reduced: DMatrix<f64>| {
             let held = columns.iter().enumerate().filter(|(i, c)| !c.free || !self.touched[*i]);
@@ -277,7 +282,11 @@ impl System {
     }
 
     /// Covariances of what is latent and of measured bodies at each of some stops, from the covariance of the reduced unknowns.
-    pub(super) fn stop_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<StopCovariance> {
+    pub(in crate::solve) fn stop_covariances(
+        &self,
+        reduced: &DMatrix<f64>,
+        stops: &[LinearStop],
+    ) -> Vec<StopCovariance> {
         let e = match &self.eliminated {
             Eliminated::Markers(e) => e,
             Eliminated::Stops(e) => return e.stop_covariances(reduced, stops),
@@ -292,7 +301,7 @@ impl System {
     }
 
     /// Covariances of the camera poses of some stops, as their body twists, m and rad.
-    pub(super) fn camera_poses(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
+    pub(in crate::solve) fn camera_poses(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<DMatrix<f64>> {
         let e = match &self.eliminated {
             Eliminated::Markers(e) => e,
             Eliminated::Stops(e) => return e.camera_poses(reduced, stops),
@@ -307,7 +316,7 @@ impl System {
         self.marker_covariances_with(reduced, None)
     }
 
-    pub(super) fn marker_covariances_with(
+    pub(in crate::solve) fn marker_covariances_with(
         &self,
         reduced: &DMatrix<f64>,
         carried: Option<&Carried>,

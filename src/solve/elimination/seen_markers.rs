@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::alike::neighbours;
-use super::linear::{LinearImage, LinearProblem};
 use crate::problem::{Adjustment, Problem};
+use crate::solve::linear::{LinearImage, LinearProblem};
 
 /// Markers that images in use show.
 #[derive(Debug, Clone)]
