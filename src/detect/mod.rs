@@ -1,45 +1,31 @@
 //! Pixels to identified observations; knows no robot.
 //!
+//! ```text
+//! pictures (files to grey values) -> run (a series: image after image) -> circles, boards or tags (one folder a family of plates;
+//!         corners: where edges cross, to parts of a pixel) -> detection -> size_seen, other_kind, dot_sizes (is it another plate)
+//! ```
+//!
 //! A new kind of plate is one file that maps a [`Picture`] and a [`Plate`] to a [`Detection`], and one row in `by_kind`.
 
-mod board_ends;
-mod board_labels;
-mod board_seen;
-mod bytes;
-pub mod charuco;
-mod charuco_markers;
-mod charuco_seen;
-pub mod chessboard;
+mod boards;
 pub mod circles;
-mod corner_finder;
 mod corners;
 mod detection;
 mod dot_sizes;
-mod edge_line;
-mod flat_field;
-mod flat_field_facts;
-mod load;
-mod misfit;
 mod other_kind;
-mod picture;
-pub mod puzzleboard;
-mod quads;
+mod pictures;
 mod run;
 mod shared;
 mod size_seen;
-mod sizes;
-mod tag_code;
-mod tag_layout;
-mod tag_scan;
-mod tag_seen;
 pub mod tags;
 
+pub use boards::{charuco, chessboard, puzzleboard};
 pub use detection::{Circles, Detection, Dropped, Outline, Sizes};
 pub use dot_sizes::set_radii;
-pub use flat_field::FlatField;
-pub use flat_field_facts::{FlatFieldFacts, LightDrift};
-pub use load::{load, load_bytes};
-pub use picture::Picture;
+pub use pictures::flat_field::FlatField;
+pub use pictures::flat_field_facts::{FlatFieldFacts, LightDrift};
+pub use pictures::load::{load, load_bytes};
+pub use pictures::picture::Picture;
 pub use run::{SeriesImage, detect_series};
 
 use crate::error::{Code, Error, Result};

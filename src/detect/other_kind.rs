@@ -1,13 +1,13 @@
 //! Which plate of another kind is in a picture that does not show that of the plate file.
 
 use super::Picture;
-use super::board_labels::{BoardSize, Shader, parity};
-use super::board_seen::{BoardSeen, SQUARES, trimmed};
-use super::charuco_seen::agreed;
-use super::chessboard::find_lattice;
-use super::quads::Quad;
-use super::tag_code::Reader;
-use super::tag_scan::{all_dictionaries, certain, passes, scan, usual_dictionaries};
+use super::boards::charuco_seen::agreed;
+use super::boards::chessboard::find_lattice;
+use super::boards::labels::{BoardSize, Shader, parity};
+use super::boards::seen::{BoardSeen, SQUARES, trimmed};
+use super::tags::code::Reader;
+use super::tags::quads::Quad;
+use super::tags::scan::{all_dictionaries, certain, passes, scan, usual_dictionaries};
 use crate::error::{Code, Error};
 use crate::series::{Plate, PlateKind, TagPrint, Tags};
 

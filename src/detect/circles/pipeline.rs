@@ -2,20 +2,20 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::agreement::{Inner, Seen, agreement};
-use super::asymmetry::Drift;
-use super::candidate::{Candidate, candidates, largest_marker};
-use super::code::{MarkerCode, Verdict};
-use super::edge_model::Pixels;
-use super::ellipse::Ellipse;
-use super::glare::allow_for_glare;
-use super::lattice::{Apart, Buckets, Cell, Lattice, lattices};
-use super::levels::Levels;
-use super::measure::{Camera, THRESHOLD, Target, drop_target, learn, target_of};
-use super::neighbour_check::{Board, Placed, around, check_neighbours, continuation, neighbourhood};
-use super::predicted::Predicted;
-use super::refine::{Fit, refine};
-use super::rescue::{Figure, Place, rescue};
+use super::candidates::candidate::{Candidate, candidates, largest_marker};
+use super::candidates::ellipse::Ellipse;
+use super::candidates::levels::Levels;
+use super::edge::model::Pixels;
+use super::edge::refine::{Fit, refine};
+use super::identity::code::{MarkerCode, Verdict};
+use super::identity::lattice::{Apart, Buckets, Cell, Lattice, lattices};
+use super::identity::neighbour_check::{Board, Placed, around, check_neighbours, continuation, neighbourhood};
+use super::measuring::agreement::{Inner, Seen, agreement};
+use super::measuring::asymmetry::Drift;
+use super::measuring::glare::allow_for_glare;
+use super::measuring::measure::{Camera, THRESHOLD, Target, drop_target, learn, target_of};
+use super::measuring::predicted::Predicted;
+use super::measuring::rescue::{Figure, Place, rescue};
 use super::smoothed::{SMOOTHINGS_PX, as_before, smoothed, variance_factor};
 use super::types::{CircleDetection, DroppedCandidate, Found, InnerOuter, Options, Outcome, Reason};
 use crate::detect::Picture;

@@ -9,7 +9,7 @@ use super::neighbours::{REACH, seed};
 use super::refusal::Refusal;
 use super::smooth::Source;
 use crate::detect::Picture;
-use crate::detect::board_labels::Lattice;
+use crate::detect::boards::labels::Lattice;
 use crate::linalg::median;
 
 /// Corners that say how the edges look, at most.

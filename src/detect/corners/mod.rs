@@ -25,7 +25,7 @@ use outline::outline;
 use refusal::Refusal;
 use rim::out_of_line;
 
-use super::board_labels::{Lattice, Placement};
+use super::boards::labels::{Lattice, Placement};
 use super::{Detection, Dropped, Picture};
 use crate::linalg::median;
 use crate::series::{Edge, Observation};

@@ -1,0 +1,255 @@
+//! Inner corners of a ChArUco board: a chessboard with ArUco markers in its light squares.
+//!
+//! The `calib-targets` library decodes the markers and so tells which corner is which; the positions are measured as on
+//! a plain chessboard, from the pixels along the edges that the markers leave free.
+
+use super::charuco_markers::{Marker, Print, decode, prints};
+use super::charuco_seen::{Seen, ids, instead};
+use super::chessboard::{WINDOW, board_size};
+use super::corner_finder::find_corners;
+use super::labels::{BoardSize, Lattice, Placement};
+use super::sizes::{best_of_sizes, on_picture};
+use crate::detect::corners::{Window, measure};
+use crate::detect::pictures::bytes::Bytes;
+use crate::detect::shared::KEEP_OFF_PX;
+use crate::detect::{Detection, Outline, Picture};
+use crate::error::{Code, Error, Notice, Result};
+use crate::series::Plate;
+
+/// Markers that must be read where the dictionary is not stated, or where an outer line is not seen.
+const LEAST_MARKERS: usize = 4;
+/// Markers of the last row that prove a row below it.
+const FURTHER_MARKERS: usize = 2;
+/// Corners that are on no board of the other layout and prove this one.
+const FURTHER_CORNERS: usize = 2;
+/// Wrong bits of a marker that proves where the board lies.
+const SURE_BITS: u8 = 1;
+
+/// Finds the inner corners of a ChArUco board (markers in the light squares counting up row by row; first square dark, or light in
+/// OpenCV's layout before 4.6); parts of the board may be out of view or covered.
+///
+/// Ids are row-major from the top-left, positions in px with (0, 0) at the centre of the top-left pixel. Where the plate
+/// does not state dictionary and marker size, OpenCV's dictionaries and the usual sizes are tried; a notice says which.
+///
+/// # Errors
+/// An unknown dictionary or one with too few markers; no board in the picture; a mirrored picture; a board of the other layout.
+pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
+    let board = board_size(plate)?;
+    let mut bytes = Bytes::of(picture);
+    let prints = prints(plate)?;
+    let least = if plate.aruco.is_some() { 1 } else { LEAST_MARKERS };
+    let at_scale = |bytes: &Bytes, scale: f64| at_scale(bytes, scale, &prints, board, least);
+    let found = best_of_sizes(&bytes, board, |found: &Found| &found.lattice, |scale| at_scale(&bytes, scale))?;
+    let Some(found) = found else {
+        bytes.mirror();
+        if at_scale(&bytes, 1.0)?.is_some() {
+            return Err(mirrored_board());
+        }
+        return Err(instead(picture, plate).map_or_else(|| no_board(plate), |seen| other_board(plate, &seen)));
+    };
+    let is_sure = found.is_sure(board);
+    if plate.aruco.is_some() && prints.first().is_some_and(|stated| stated.legacy != found.print.legacy) {
+        let error = other_layout(found.print.legacy);
+        return if found.tells_layout() { Ok(Detection::other_size(error)) } else { Err(error) };
+    }
+    if plate.aruco.is_none() && found.rival.is_some_and(|rival| rival >= found.explains()) {
+        return Err(either_layout());
+    }
+    if found.has_further_row && is_sure {
+        return Ok(Detection::beyond(more_rows(plate)));
+    }
+    let Found { print, lattice, .. } = found;
+    let window = Window { arm: 0.5 * (1.0 - print.ratio), keep_off_px: KEEP_OFF_PX, ..WINDOW };
+    let mut detection = measure(picture, &lattice, Placement::on_board(board, print.legacy), window);
+    if detection.outline == Outline::LineMissing && is_sure {
+        detection.outline = Outline::TagsMissing;
+    }
+    if detection.observations.is_empty()
+        && let Some(seen) = instead(picture, plate)
+    {
+        return Err(other_board(plate, &seen));
+    }
+    if plate.aruco.is_none() {
+        detection.notices.push(found_print(&print));
+    }
+    Ok(detection)
+}
+
+/// What was found at one of the sizes.
+struct Found {
+    print: Print,
+    markers: usize,
+    /// Corners of the board in px of the picture.
+    lattice: Lattice,
+    /// Whether the markers alone say which corner is which on a board of this layout, wherever it seems to end.
+    has_place: bool,
+    /// Whether the board goes on below its last row.
+    has_further_row: bool,
+    /// What the other layout explains, where markers fit into it.
+    rival: Option<(usize, usize)>,
+}
+
+impl Found {
+    /// Markers that were read, then corners that are on the board: in the other layout most markers agree, moved by a column.
+    fn explains(&self) -> (usize, usize) {
+        (self.markers, self.lattice.len())
+    }
+
+    /// Whether the markers alone say which corner is which. On a board with an odd number of squares in a row they fit into both layouts,
+    /// moved by a column: where one of these is not seen at all, the other may be the moved one.
+    fn is_sure(&self, board: BoardSize) -> bool {
+        let told = match self.rival {
+            Some((markers, _)) => markers < self.markers,
+            None => board.rows % 2 == 0 || board.columns % 2 == 1,
+        };
+        self.has_place && told
+    }
+
+    /// Whether markers or corners are seen that are on no board of the other layout.
+    fn tells_layout(&self) -> bool {
+        let (markers, corners) = self.rival.unwrap_or_default();
+        self.has_place && (self.markers > markers || self.lattice.len() >= corners + FURTHER_CORNERS)
+    }
+}
+
+/// The print that explains most markers in the picture at another size, with what was found.
+fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least: usize) -> Result<Option<Found>> {
+    let scaled = bytes.scaled(scale);
+    let corners = find_corners(&scaled);
+    let mut best: Option<Found> = None;
+    let mut all: Vec<(bool, (usize, usize))> = Vec::new();
+    for print in prints {
+        let Some(found) = decode(&scaled.view(), &corners, print, board)? else { continue };
+        let markers = found.markers.len();
+        if markers < least {
+            continue;
+        }
+        let place = |[x, y]: [f32; 2]| [x, y].map(|c| on_picture(c, scale));
+        let lattice: Lattice = found.corners.iter().map(|(at, px)| (*at, place(*px))).collect();
+        let has_place = have_place(&found.markers);
+        let has_further_row = has_further_row(&found.markers, board);
+        let found = Found { print: *print, markers, lattice, has_place, has_further_row, rival: None };
+        all.push((print.legacy, found.explains()));
+        if best.as_ref().is_none_or(|other| other.explains() < found.explains()) {
+            best = Some(found);
+        }
+    }
+    if let Some(best) = &mut best {
+        let rivals = all.iter().filter(|(legacy, _)| *legacy != best.print.legacy);
+        best.rival = rivals.map(|(_, explains)| *explains).max();
+    }
+    Ok(best)
+}
+
+/// Whether markers of the last row of squares are read: that takes the corners below them, and at the end of a board there are none.
+fn has_further_row(markers: &[Marker], board: BoardSize) -> bool {
+    markers.iter().filter(|m| m.wrong_bits <= SURE_BITS && m.row == board.rows).count() >= FURTHER_MARKERS
+}
+
+/// Whether enough markers, in more than one row, say where a board of their layout lies: with twenty cells of 4 x 4 bits, one such place in 50 million boards
+/// is there by chance.
+fn have_place(markers: &[Marker]) -> bool {
+    let rows: Vec<i32> = markers.iter().filter(|m| m.wrong_bits <= SURE_BITS).map(|m| m.row).collect();
+    rows.len() >= LEAST_MARKERS && rows.iter().any(|r| *r != rows[0])
+}
+
+fn found_print(print: &Print) -> Notice {
+    Notice::new(
+        Code::DictionaryGuessed,
+        "plate",
+        format!(
+            "markers of {} with a side of about {} squares were found{}",
+            print.dictionary.name(),
+            print.ratio,
+            if print.legacy { ", in OpenCV's layout before 4.6" } else { "" }
+        ),
+        match print.legacy {
+            false => "write dictionary and side_m under [aruco] in the plate file, which is faster and safer",
+            true => {
+                "write dictionary, side_m and legacy = true under [aruco] in the plate file, which is faster and safer"
+            }
+        },
+    )
+}
+
+fn not_found(plate: &Plate) -> String {
+    match &plate.aruco {
+        Some(aruco) => format!("no ChArUco board with markers of {} found", aruco.dictionary),
+        None => "no ChArUco board with markers of a usual kind found".to_owned(),
+    }
+}
+
+fn no_board(plate: &Plate) -> Error {
+    let remedy =
+        "check that the board is in view and sharp, and columns, rows (inner corners) and [aruco] of the plate file";
+    Error::new(Code::PlateNotFound, "image", not_found(plate), remedy)
+}
+
+fn other_board(plate: &Plate, seen: &Seen) -> Error {
+    let mut differs = Vec::new();
+    if seen.dictionary_differs(plate) {
+        differs.push(format!("the markers are those of {}", seen.dictionary));
+    }
+    if seen.side_by_side {
+        differs.push("they stand side by side, as on an aruco-grid".to_owned());
+    } else {
+        if let Some(columns) = seen.columns.filter(|n| *n != plate.columns) {
+            differs
+                .push(format!("they stand as on a board with {columns} inner corners in a row, not {}", plate.columns));
+        }
+        if let Some(id) = seen.middle_id.filter(|_| seen.ids_differ(plate)) {
+            let stated = ids(plate);
+            let last = stated.end.saturating_sub(1);
+            differs.push(format!("their numbers are about {id}, and those of the board {} to {last}", stated.start));
+        }
+        if let Some(side) = seen.side.filter(|_| seen.side_differs(plate)) {
+            differs.push(format!("their side is {side:.2} squares"));
+        }
+    }
+    let remedy = match seen.side_by_side {
+        true => {
+            "write kind = \"aruco-grid\" in the plate file, with columns, rows (markers), marker_m, gap_m and dictionary"
+        }
+        false => {
+            "correct the plate file: columns and rows count inner corners (one less than squares), columns from left to right; dictionary \
+             (this one, or a shorter one of its kind), side_m and first_id (the number of the first marker) stand under [aruco]"
+        }
+    };
+    Error::new(Code::PlateNotFound, "image", format!("{}: {}", not_found(plate), differs.join(", ")), remedy)
+}
+
+fn more_rows(plate: &Plate) -> Error {
+    let what = format!("the board goes on below the {} rows of inner corners of the plate file", plate.rows);
+    let remedy = "correct rows of the plate file: columns and rows count inner corners (one less than squares)";
+    Error::new(Code::PlateContradicted, "image", what, remedy)
+}
+
+fn other_layout(legacy: bool) -> Error {
+    let (what, remedy) = match legacy {
+        true => (
+            "the board has OpenCV's layout before 4.6: its first square is light",
+            "write legacy = true under [aruco] in the plate file",
+        ),
+        false => (
+            "the first square of the board is dark, which is not OpenCV's layout before 4.6",
+            "remove legacy from [aruco] in the plate file",
+        ),
+    };
+    Error::new(Code::PlateNotDetectable, "image", what, remedy)
+}
+
+fn either_layout() -> Error {
+    let what =
+        "the markers in view fit into both of OpenCV's layouts, a column apart: which corner is which cannot be told";
+    let remedy = "write dictionary, side_m and legacy (true for the layout before 4.6) under [aruco] in the plate file";
+    Error::new(Code::PlateIncomplete, "image", what, remedy)
+}
+
+fn mirrored_board() -> Error {
+    Error::new(
+        Code::PlateMirrored,
+        "image",
+        "the board is mirrored",
+        "turn off mirroring in the camera or in the image export",
+    )
+}

@@ -1,0 +1,40 @@
+//! At which size of the picture a board with a code is found best.
+
+use super::labels::{BoardSize, Lattice};
+use crate::detect::pictures::bytes::Bytes;
+use crate::error::Result;
+
+/// Sizes of the picture, over its own, at which a code is sought, until one shows most of the board; large pictures begin with half.
+const SCALES: [f64; 3] = [1.0, 0.5, 1.5];
+const SCALES_LARGE: [f64; 3] = [0.5, 1.0, 0.25];
+/// Pixels of a large picture.
+const LARGE_PX: usize = 2_000_000;
+/// Share of the board's corners from which no other size is tried.
+const MOST: f64 = 0.75;
+
+/// The find with most corners of the board; `None` where there is no board at any size.
+pub(super) fn best_of_sizes<T>(
+    bytes: &Bytes,
+    board: BoardSize,
+    lattice: impl Fn(&T) -> &Lattice,
+    at_scale: impl Fn(f64) -> Result<Option<T>>,
+) -> Result<Option<T>> {
+    let large = bytes.width * bytes.height > LARGE_PX;
+    let mut best: Option<T> = None;
+    for scale in if large { SCALES_LARGE } else { SCALES } {
+        let Some(found) = at_scale(scale)? else { continue };
+        if best.as_ref().is_none_or(|other| lattice(&found).len() > lattice(other).len()) {
+            best = Some(found);
+        }
+        let corners = best.as_ref().map_or(0, |b| lattice(b).len());
+        if corners as f64 >= MOST * f64::from(board.columns * board.rows) {
+            break;
+        }
+    }
+    Ok(best)
+}
+
+/// A place in a picture of another size; pixels are counted from their centres.
+pub(super) fn on_picture(c: f32, scale: f64) -> f64 {
+    (f64::from(c) + 0.5) / scale - 0.5
+}

@@ -1,0 +1,24 @@
+//! Corners of the square tags of an AprilGrid, of a grid of ArUco markers, or of a single tag.
+//!
+//! ```text
+//! picture -> quadrilaterals -> codes -> do the neighbours agree -> tags that are missing -> sides -> corners
+//! ```
+//!
+//! A code of few bits is read by chance now and then: such a tag counts only where the tags around it say that it stands there.
+//!
+//! ```text
+//! quads (quadrilaterals) -> code, scan (what is written in them) -> layout (do the neighbours agree)
+//!         -> edge_line, misfit (sides, and what disturbs them) -> pipeline (the stages in their order) -> seen (what stands there instead)
+//! ```
+
+pub(super) mod code;
+mod edge_line;
+pub(super) mod layout;
+mod misfit;
+mod pipeline;
+pub(super) mod quads;
+pub(super) mod scan;
+mod seen;
+
+pub use pipeline::detect;
+pub(super) use pipeline::unseen_line;

@@ -1,0 +1,71 @@
+//! The tags of a dictionary in a picture, whatever the plate file says of them.
+
+use std::collections::BTreeMap;
+
+use calib_targets_aruco::{Dictionary, builtins};
+
+use super::code::{Reader, Reading};
+use super::layout::{Layout, Tagged};
+use super::quads::{Quad, inverted, quads};
+use crate::detect::Picture;
+
+/// Largest tags, as shares of the picture's longer side, that are looked for one after the other (the threshold follows the light
+/// over this length), and thresholds between paper and ink: above the middle, where the crossing of two dark squares is light, and
+/// further up for squares that blur joins.
+const PASSES: [(f64, f32); 5] = [(0.1, 0.6), (0.3, 0.6), (0.9, 0.6), (0.1, 0.75), (0.3, 0.75)];
+/// Tags whose numbers fit to their places: not by chance.
+const LEAST_IN_LAYOUT: usize = 4;
+
+/// Dictionaries of OpenCV's boards, the longest of each kind, which begins with the others.
+pub fn usual_dictionaries() -> impl Iterator<Item = Dictionary> {
+    let longest = [builtins::DICT_4X4_1000, builtins::DICT_5X5_1000, builtins::DICT_6X6_1000, builtins::DICT_7X7_1000];
+    longest.into_iter().chain([builtins::DICT_ARUCO_ORIGINAL, builtins::DICT_APRILTAG_36h11])
+}
+
+/// All that OpenCV has.
+pub fn all_dictionaries() -> impl Iterator<Item = Dictionary> {
+    let others = [builtins::DICT_APRILTAG_16h5, builtins::DICT_APRILTAG_25h9, builtins::DICT_APRILTAG_36h10];
+    usual_dictionaries().chain(others).chain([builtins::DICT_ARUCO_MIP_36h12])
+}
+
+/// Dark quadrilaterals, pass by pass.
+pub fn passes(picture: &Picture) -> impl Iterator<Item = Vec<Quad>> {
+    let longer = picture.width.max(picture.height) as f64;
+    let inverted = inverted(picture);
+    PASSES.into_iter().map(move |(share, threshold)| quads(&inverted, share * longer, threshold))
+}
+
+/// Adds what the quadrilaterals of a pass say; of two that say the same none is known to be right.
+pub(super) fn read_pass(quads: &[Quad], read: impl Fn(&Quad) -> Option<Reading>, found: &mut BTreeMap<u32, Reading>) {
+    let mut seen: BTreeMap<u32, Vec<Reading>> = BTreeMap::new();
+    for reading in quads.iter().filter_map(read) {
+        seen.entry(reading.id).or_default().push(reading);
+    }
+    for (id, readings) in seen {
+        if let [reading] = &readings[..] {
+            found.entry(id).or_insert(*reading);
+        }
+    }
+}
+
+/// What all quadrilaterals say, in print or in a mirror.
+pub fn scan(picture: &Picture, reader: &Reader, passes: &[Vec<Quad>], mirrored: bool) -> BTreeMap<u32, Reading> {
+    let mut found = BTreeMap::new();
+    for quads in passes {
+        read_pass(quads, |quad| reader.read(picture, quad, mirrored), &mut found);
+    }
+    found
+}
+
+/// The tags that can hardly be there by chance: they stand where their numbers say, or each has so many bits more than that.
+pub fn certain(reader: &Reader, found: &BTreeMap<u32, Reading>, bits: f64) -> Tagged {
+    let tags = corners(found);
+    let in_layout = Layout::of(&tags).counted_as_seen();
+    let sure = |id: &u32| reader.bits_beyond_chance(found[id].wrong, reader.count()) >= bits;
+    let enough = in_layout.len() >= LEAST_IN_LAYOUT;
+    tags.into_iter().filter(|(id, _)| if enough { in_layout.contains_key(id) } else { sure(id) }).collect()
+}
+
+pub fn corners(readings: &BTreeMap<u32, Reading>) -> Tagged {
+    readings.iter().map(|(id, reading)| (*id, reading.corners)).collect()
+}
