@@ -2,12 +2,16 @@
 
 use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
+use super::left_out::{
+    exchanged_pictures, exchanged_readings, left_out_bodies, left_out_images, left_out_observations, many_left_out,
+    moved, shifted_measurements,
+};
+use super::steps::{loose, pose_step};
 use super::{
-    camera_model, camera_pattern, contradicted_distances, exchanged_pictures, exchanged_readings, extrapolates,
-    few_images, focus, held_near_nominal, joint_noise, left_out_bodies, left_out_images, left_out_observations,
-    length_standard, loose, many_left_out, marker_off, measurement_scatter, moved, no_gain, odd_image, parameter_off,
-    plate_size, pose_step, reading_ratio, repeated_measurements, rounded_readings, scatter, shifted_measurements,
-    small_gain, stated_noise, tag_size, undetermined, zeros_off,
+    camera_model, camera_pattern, contradicted_distances, extrapolates, few_images, focus, held_near_nominal,
+    joint_noise, length_standard, marker_off, measurement_scatter, no_gain, odd_image, parameter_off, plate_size,
+    reading_ratio, repeated_measurements, rounded_readings, scatter, small_gain, stated_noise, tag_size, undetermined,
+    zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};

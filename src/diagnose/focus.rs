@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::displaced::Displaced;
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::steps::displaced::Displaced;
 use crate::error::Code;
 use crate::fit::FocalLength;
 use crate::problem::Problem;

@@ -1,5 +1,7 @@
 //! What the data contradict: one file a check with what it finds, one row in [`CHECKS`].
 //!
+//! Most checks stand side by side here. `steps` looks for what stands elsewhere at some of the stops, `left_out` at what was left out of the fit.
+//!
 //! To add one: a file with a function of the stage at which it runs and a type that is a `Kind`; the type as a variant of
 //! [`Finding`]; the function as a row of [`CHECKS`]. Numbers that decide stand in [`crate::assess::Limits`].
 //!
@@ -7,89 +9,71 @@
 //! [`ToolInPoses`] and [`LensNotInRos`] by `identify`, [`Mistake`] in touches of a tool by `frames` of the command line, too; [`Noticed`] is a
 //! notice that was given on the way.
 
-mod agreement;
 mod camera_model;
 mod camera_pattern;
 mod checks;
 mod computed_postures;
 mod contradicted_distances;
-mod displaced;
-mod exchanged_pictures;
-mod exchanged_readings;
 mod extrapolates;
 mod few_images;
 mod finding;
 mod focus;
 mod held_near_nominal;
-mod images_shifted;
 mod joint_noise;
 mod kind;
-mod left_out_bodies;
-mod left_out_images;
-mod left_out_observations;
+mod left_out;
 mod length_standard;
 mod lens_not_in_ros;
-mod loose;
-mod loose_mounting;
 mod lost_images;
-mod many_left_out;
 mod marker_off;
 mod measurement_scatter;
 mod mistake;
-mod moved;
 mod no_gain;
 mod noticed;
 mod odd_image;
 mod parameter_off;
 mod plate_size;
-mod pose_step;
 mod rail;
 mod reading_ratio;
 mod repeated_measurements;
 mod rounded_readings;
 mod scatter;
-mod shifted_measurements;
 mod small_gain;
 mod stands_still;
 mod stated_noise;
-mod step_candidates;
-mod step_orders;
-mod step_rows;
+mod steps;
 mod tag_size;
 mod tool_in_poses;
 mod undetermined;
-mod zero_moved;
 mod zeros_off;
 
-pub use agreement::agreement;
 pub use camera_model::CameraModelMisfit;
 pub use camera_pattern::{ResidualPattern, residual_pattern};
 pub use checks::{CHECKS, Check, Diagnosis, Stage, follows_from_tool};
 pub use computed_postures::ComputedPostures;
 pub use contradicted_distances::{ContradictedDistances, DistanceOff};
-pub use displaced::{Carried, Displaced, Displacement};
-pub use exchanged_pictures::ExchangedPictures;
-pub use exchanged_readings::ExchangedReadings;
 pub use extrapolates::Extrapolates;
 pub use few_images::FewImages;
 pub use finding::Finding;
 pub use focus::FocusChange;
 pub use held_near_nominal::HeldNearNominal;
-pub use images_shifted::ImagesShifted;
 pub use joint_noise::{ImageValue, JointNoiseLarge};
 pub use kind::{CheckContext, Quantity, StatedNoise, Subject, Weight};
-pub use left_out_bodies::MeasurementsLeftOut;
-pub use left_out_images::ImagesLeftOut;
-pub use left_out_observations::{ObservationsLeftOut, observations_left_out};
+pub use left_out::agreement::agreement;
+pub use left_out::exchanged_pictures::ExchangedPictures;
+pub use left_out::exchanged_readings::ExchangedReadings;
+pub use left_out::left_out_bodies::MeasurementsLeftOut;
+pub use left_out::left_out_images::ImagesLeftOut;
+pub use left_out::left_out_observations::{ObservationsLeftOut, observations_left_out};
+pub use left_out::many_left_out::{ManyLeftOut, many_left_out};
+pub use left_out::moved::BodyMoved;
+pub use left_out::shifted_measurements::ShiftedMeasurements;
 pub use length_standard::{ContradictedLengths, PlateSays};
 pub use lens_not_in_ros::LensNotInRos;
-pub use loose_mounting::LooseMounting;
 pub use lost_images::LostImages;
-pub use many_left_out::{ManyLeftOut, many_left_out};
 pub use marker_off::MarkerOff;
 pub use measurement_scatter::MeasurementsScatter;
 pub use mistake::{Mistake, MistakeKind, RowsOf, ShiftedPart};
-pub use moved::BodyMoved;
 pub use no_gain::NoGain;
 pub use noticed::Noticed;
 pub use odd_image::OddImage;
@@ -99,12 +83,14 @@ pub use reading_ratio::ReadingRatio;
 pub use repeated_measurements::RepeatedMeasurements;
 pub use rounded_readings::ReadingsRounded;
 pub use scatter::LargeScatter;
-pub use shifted_measurements::ShiftedMeasurements;
 pub use small_gain::SmallGain;
 pub use stands_still::{StandsStill, all_stand_still, stands_still};
 pub use stated_noise::NoiseContradicted;
+pub use steps::displaced::{Carried, Displaced, Displacement};
+pub use steps::images_shifted::ImagesShifted;
+pub use steps::loose_mounting::LooseMounting;
+pub use steps::zero_moved::ZeroMoved;
 pub use tag_size::{TagsOff, tags_off};
 pub use tool_in_poses::{PosesOf, ToolInPoses};
 pub use undetermined::FlangeUndetermined;
-pub use zero_moved::ZeroMoved;
 pub use zeros_off::ZeroOff;

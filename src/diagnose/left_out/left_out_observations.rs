@@ -1,7 +1,7 @@
 //! Do most observations agree with the others?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::assess::Limits;
+use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
 use crate::problem::Adjustment;
 
@@ -14,7 +14,7 @@ pub struct ObservationsLeftOut {
     pub worst: (String, f64),
 }
 
-pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<ObservationsLeftOut> {
+pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<ObservationsLeftOut> {
     observations_left_out(adjustment, setting.limits)
 }
 

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use super::step_candidates::{Candidate, Changed, Order, Shown, stride};
-use super::step_rows::{Linear, Step};
+use super::candidates::{Candidate, Changed, Order, Shown, stride};
+use super::rows::{Linear, Step};
 use crate::problem::{InstrumentKind, Problem};
 use crate::series::CameraMount;
 

@@ -3,15 +3,15 @@
 
 use nalgebra::Vector6;
 
+use super::candidates::Changed;
 use super::displaced::{Carried, Displaced, Displacement};
-use super::finding::Finding;
 use super::images_shifted::ImagesShifted;
-use super::kind::{CheckContext, Weight};
 use super::loose_mounting::LooseMounting;
-use super::moved::CHANGES;
-use super::step_candidates::Changed;
-use super::step_rows::{Linear, Step};
+use super::rows::{Linear, Step};
 use crate::assess::{Accuracy, Limits};
+use crate::diagnose::finding::Finding;
+use crate::diagnose::kind::{CheckContext, Weight};
+use crate::diagnose::left_out::moved::CHANGES;
 use crate::fit::Fit;
 use crate::geom::Pose;
 use crate::linalg::median;
@@ -56,7 +56,7 @@ fn split(values: &[f64], fewest: usize) -> Option<Split> {
 }
 
 /// Every mounting whose camera, or whose plate, has two places by turns.
-pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Finding> {
+pub fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Finding> {
     let fit = setting.with_noise_found(fit);
     (0..fit.problem.mountings.len()).filter_map(|m| of_mounting(fit, m, setting)).collect()
 }

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::step_candidates::{Candidate, Changed, Order, Shown, bracket, fixture};
+use super::candidates::{Candidate, Changed, Order, Shown, bracket, fixture};
 use crate::assess::{RootInformation, StopInformation, log_chance};
 use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
 use crate::model::joint_terms::Term;
@@ -15,7 +15,7 @@ use crate::series::CameraMount;
 use crate::solve::LinearProblem;
 
 /// One stop.
-pub(super) struct Row {
+pub struct Row {
     /// Index of its noise: series that several cameras took at the same stops are one.
     pub(super) group: usize,
     pub(super) shown: Rc<Vec<Shown>>,
@@ -67,7 +67,7 @@ impl Row {
 
 /// What of the poses that were seen is looked at: positions and rotations of a tracker have noise of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Part {
+pub enum Part {
     Pose,
     Position,
     Rotation,
@@ -75,7 +75,7 @@ pub(super) enum Part {
 
 /// A change between two parts of the stops.
 #[derive(Debug, Clone)]
-pub(super) struct Step {
+pub struct Step {
     pub(super) changed: Changed,
     pub(super) order: Order,
     /// Index of the noise of its stops.
@@ -124,7 +124,7 @@ impl Step {
 }
 
 /// The fit, linearised.
-pub(super) struct Linear {
+pub struct Linear {
     pub(super) rows: Vec<Row>,
     information: DMatrix<f64>,
     /// Columns of the zeros of readings.

@@ -1,7 +1,7 @@
 //! Do pictures of two cameras that were left out fit each other's place?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::assess::Limits;
+use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::init::resect;
 use crate::problem::{Adjustment, Image, ImageRejection, Weighting};
@@ -21,7 +21,7 @@ pub struct ExchangedPictures {
 }
 
 /// Every two cameras once.
-pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedPictures> {
+pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedPictures> {
     let images = &adjustment.problem.images;
     let mut found: Vec<ExchangedPictures> = Vec::new();
     let is_out = |i: usize| images[i].rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);
@@ -74,7 +74,7 @@ fn is_better(adjustment: &Adjustment, image: usize, misfit: f64, setting: &Check
 
 impl ExchangedPictures {
     /// True of what seems to have moved where all its images are of these.
-    pub(super) fn explains(&self, images: &[String]) -> bool {
+    pub(in crate::diagnose) fn explains(&self, images: &[String]) -> bool {
         images.iter().all(|name| self.images.iter().flatten().any(|own| own == name))
     }
 }

@@ -1,7 +1,7 @@
 //! The finding that the zero of a joint is another at some of the stops, or creeps; [`super::pose_step`] looks for it.
 
 use super::displaced::Displacement;
-use super::kind::{Kind, Quantity, Subject, Weight};
+use crate::diagnose::kind::{Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::urdf::JointKind;
 
@@ -28,7 +28,7 @@ pub struct ZeroMoved {
 
 impl ZeroMoved {
     /// True where hand or camera seem to have two positions because of it.
-    pub(super) fn explains_two_places(&self) -> bool {
+    pub(in crate::diagnose) fn explains_two_places(&self) -> bool {
         self.weight == Weight::Gate && self.displacement == Displacement::FromThenOn
     }
 

@@ -1,6 +1,6 @@
 //! Do measurements of trackers and contacts belong to their stops?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
+use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::problem::{Adjustment, BodyRejection, stop_name};
 
@@ -18,7 +18,7 @@ pub struct MeasurementsLeftOut {
     pub weight: Weight,
 }
 
-pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<MeasurementsLeftOut> {
+pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<MeasurementsLeftOut> {
     let problem = &adjustment.problem;
     let mut named = Vec::new();
     for measured in &problem.body_measurements {

@@ -10,7 +10,7 @@ use crate::problem::{Adjustment, BodyMeasurement, InstrumentKind, Layout, Proble
 
 /// What may be another from some stop on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Changed {
+pub enum Changed {
     /// The pose of a plate.
     Placement(usize),
     /// The pose of a camera.
@@ -108,7 +108,7 @@ fn is_socket(problem: &Problem, instrument: usize) -> bool {
 
 /// How the stops are divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Order {
+pub enum Order {
     /// By rows: changed once.
     Time,
     /// By how far this axis of what the robot carries points up: held by its weight only.
@@ -123,7 +123,7 @@ pub(super) enum Order {
 
 /// Something that was measured at a stop.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Shown {
+pub enum Shown {
     /// An image, with up in the axes of what the robot carries.
     Image { index: usize, up: [f64; 3] },
     /// A measurement of a body.
@@ -166,7 +166,7 @@ impl Shown {
 
 /// A way to divide stops: the rows of [`Linear`] behind the step, from the last on.
 #[derive(Clone)]
-pub(super) struct Candidate {
+pub struct Candidate {
     pub(super) changed: Changed,
     pub(super) order: Order,
     pub(super) group: usize,

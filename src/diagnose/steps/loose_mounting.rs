@@ -1,6 +1,6 @@
 //! The finding that a camera sits loosely on its mount; [`super::loose`] looks for it.
 
-use super::kind::{Kind, Quantity, Subject, some_of};
+use crate::diagnose::kind::{Kind, Quantity, Subject, some_of};
 use crate::error::Code;
 
 /// Most images that are named.

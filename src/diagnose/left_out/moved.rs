@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::agreement::{Agreement, Moved, agreement};
-use super::kind::{CheckContext, Kind, Quantity, Subject, some_of};
+use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, some_of};
 use crate::error::Code;
 use crate::init::{HandEye, SeenStop};
 use crate::problem::{Adjustment, ImageRejection, Problem};
@@ -25,10 +25,10 @@ pub struct BodyMoved {
 }
 
 /// Changes between the two places beyond that of a move, or of one to and fro with a wrong image or two in between.
-pub(super) const CHANGES: usize = 6;
+pub const CHANGES: usize = 6;
 
 /// What the wrongly paired images of a series agree on, for each mounting and placement.
-pub(super) fn check(Adjustment { problem, state }: &Adjustment, setting: &CheckContext) -> Vec<BodyMoved> {
+pub fn check(Adjustment { problem, state }: &Adjustment, setting: &CheckContext) -> Vec<BodyMoved> {
     let mut groups: BTreeMap<[usize; 3], Vec<(usize, SeenStop)>> = BTreeMap::new();
     for (i, image) in problem.images.iter().enumerate() {
         let suspect = image.rejected.as_ref().is_some_and(ImageRejection::is_wrong_pair);

@@ -1,6 +1,6 @@
 //! Do most images belong to their joint readings?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
+use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::problem::{Adjustment, ImageRejection};
 
@@ -20,7 +20,7 @@ pub struct ImagesLeftOut {
     pub weight: Weight,
 }
 
-pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<ImagesLeftOut> {
+pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<ImagesLeftOut> {
     let (problem, on_robot) = (&adjustment.problem, setting.on_robot);
     let left_out = on_robot - problem.used_on_robot().count();
     let share = |limit: f64| left_out as f64 > limit * on_robot as f64;

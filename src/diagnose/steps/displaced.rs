@@ -1,6 +1,6 @@
 //! The finding that a plate or a camera stands elsewhere in some of the images; [`super::pose_step`] looks for it.
 
-use super::kind::{Kind, Quantity, Subject, Weight, some_of};
+use crate::diagnose::kind::{Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 
 /// Most images that are named.
@@ -71,17 +71,17 @@ pub struct Displaced {
 
 impl Displaced {
     /// True where it happened in the course of time, in images of this mounting.
-    pub(super) fn explains_two_places_of(&self, mounting: &str) -> bool {
+    pub(in crate::diagnose) fn explains_two_places_of(&self, mounting: &str) -> bool {
         self.explains_most && !matches!(self.displacement, Displacement::AxisUp(_)) && self.mounting == mounting
     }
 
     /// True where measurements with this instrument scatter because of it.
-    pub(super) fn explains_scatter_of(&self, instrument: &str) -> bool {
+    pub(in crate::diagnose) fn explains_scatter_of(&self, instrument: &str) -> bool {
         self.explains_most && self.is_measured() && self.mounting == instrument
     }
 
     /// True where a tracker or contacts show it, not images.
-    pub(super) fn is_measured(&self) -> bool {
+    pub(in crate::diagnose) fn is_measured(&self) -> bool {
         matches!(self.body, Carried::Instrument | Carried::Target | Carried::Bracket | Carried::Fixture)
     }
 

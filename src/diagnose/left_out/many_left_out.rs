@@ -1,7 +1,7 @@
 //! Do most images say something, whatever the others were left out for?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Limits;
+use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::problem::{Adjustment, Problem};
 
@@ -17,7 +17,7 @@ pub struct ManyLeftOut {
 }
 
 /// Images of the robot.
-pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<ManyLeftOut> {
+pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<ManyLeftOut> {
     let problem = &adjustment.problem;
     let of = (0..problem.images.len()).filter(|&i| problem.on_robot(i)).count();
     let found = ManyLeftOut { left_out: of - problem.used_on_robot().count(), of, on_robot: true };

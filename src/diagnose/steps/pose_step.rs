@@ -23,21 +23,21 @@
 
 use std::collections::BTreeSet;
 
+use super::candidates::{Changed, Order, Shown};
 use super::displaced::{Carried, Displaced, Displacement};
-use super::finding::Finding;
-use super::focus::{self, FocusChange};
 use super::images_shifted::ImagesShifted;
-use super::kind::{CheckContext, Weight};
-use super::step_candidates::{Changed, Order, Shown};
-use super::step_rows::{Linear, Part, Step};
+use super::rows::{Linear, Part, Step};
 use super::zero_moved::ZeroMoved;
 use crate::assess::{Accuracy, Limits};
+use crate::diagnose::finding::Finding;
+use crate::diagnose::focus::{self, FocusChange};
+use crate::diagnose::kind::{CheckContext, Weight};
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem, stop_name};
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
-pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Finding> {
+pub fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Finding> {
     let fit = setting.with_noise_found(fit);
     find_steps(fit, setting.limits).iter().filter_map(|step| finding(step, fit, setting)).collect()
 }

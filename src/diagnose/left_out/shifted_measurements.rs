@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::{Limits, best_run};
+use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::linalg::median;
 use crate::problem::{
@@ -28,7 +28,7 @@ pub struct ShiftedMeasurements {
 }
 
 /// One for every tracker and target; of targets that are shifted alike the first.
-pub(super) fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ShiftedMeasurements> {
+pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ShiftedMeasurements> {
     let problem = &adjustment.problem;
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (k, measured) in problem.body_measurements.iter().enumerate() {

@@ -1,10 +1,10 @@
 //! The finding that some pictures of a camera are cut out elsewhere than the others; [`super::pose_step`] and [`super::loose`] look for it.
 
+use super::candidates::Order;
 use super::displaced::Displaced;
-use super::focus::FocusChange;
-use super::kind::{Kind, Quantity, Subject, Weight, some_of};
-use super::step_candidates::Order;
-use super::step_rows::Step;
+use super::rows::Step;
+use crate::diagnose::focus::FocusChange;
+use crate::diagnose::kind::{Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::problem::Problem;
 
@@ -46,17 +46,17 @@ impl ImagesShifted {
     }
 
     /// True where plate or camera seem to stand elsewhere because of it.
-    pub(super) fn looks_like(&self, moved: &Displaced) -> bool {
+    pub(in crate::diagnose) fn looks_like(&self, moved: &Displaced) -> bool {
         self.weight == Weight::Gate && !moved.is_measured() && self.mountings.contains(&moved.mounting)
     }
 
     /// True where the camera on this mounting seems to have two places.
-    pub(super) fn explains_two_places_of(&self, mounting: &str) -> bool {
+    pub(in crate::diagnose) fn explains_two_places_of(&self, mounting: &str) -> bool {
         self.weight == Weight::Gate && self.mountings.iter().any(|own| own == mounting)
     }
 
     /// True where the focal length seems to be another because of it.
-    pub(super) fn explains_focus(&self, other: &FocusChange) -> bool {
+    pub(in crate::diagnose) fn explains_focus(&self, other: &FocusChange) -> bool {
         self.weight == Weight::Gate && self.camera == other.camera
     }
 }

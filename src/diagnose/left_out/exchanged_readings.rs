@@ -1,6 +1,6 @@
 //! Do images that were left out fit the readings of each other?
 
-use super::kind::{Kind, Quantity, Subject, Weight, some_of};
+use crate::diagnose::kind::{Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::problem::{Adjustment, Image, ImageRejection, Mismatch, Problem};
 
@@ -21,7 +21,7 @@ pub struct ExchangedReadings {
 }
 
 /// Every circle once, and once for all cameras that saw its stops.
-pub(super) fn check(adjustment: &Adjustment) -> Vec<ExchangedReadings> {
+pub fn check(adjustment: &Adjustment) -> Vec<ExchangedReadings> {
     let problem = &adjustment.problem;
     let mut found: Vec<ExchangedReadings> = Vec::new();
     for (first, image) in problem.images.iter().enumerate() {
