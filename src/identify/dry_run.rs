@@ -1,6 +1,6 @@
 //! Before any image is looked at: what the stops of a series can tell of the robot.
 
-use super::controller_readings::readings_of;
+use super::controller::readings::readings_of;
 use super::options::Options;
 use crate::assess::{Identifiability, identifiability_of_stops};
 use crate::error::{Code, Error, Result};

@@ -1,84 +1,65 @@
 //! Series -> solution: `series -> observations -> free poses -> starting values -> joint fit -> assessment`.
+//!
+//! | in the order of the data | |
+//! |---|---|
+//! | `options`, `selection`, `estimator` | what is asked for |
+//! | `observations` | a series as read -> as seen |
+//! | `controller` | poses of a controller -> readings |
+//! | `problem` | series -> the least-squares problem |
+//! | `photogrammetry` | images alone -> cameras, plates, camera poses |
+//! | `start` | camera poses, readings -> starting values of cameras and plates on the robot |
+//! | `bodies` | what trackers and contacts measured -> starting values of instruments and bodies |
+//! | `mistakes` | where no start fits: which usual mistake explains it |
+//! | `joint_fit` | starting values -> the fit |
+//! | `model_choice` | fits -> lens and robot model |
+//! | `two_stage` | the other estimators, beside the joint fit |
+//! | `solution` | what all of this gives |
+//!
+//! [`identify`] in `run` strings these together. Beside them, `dry_run` looks at a series before its images are, and `verify` judges a robot model by a
+//! series that it was not fitted to.
 
-mod bases;
-mod block_diagonal;
 mod bodies;
-mod bodies_measured;
-mod bodies_start;
-mod bodies_taken_back;
-mod body_breaks;
-mod body_misfit;
-mod body_mistakes;
-mod body_placed;
-mod breaks;
-mod build;
-mod compare;
-mod comparison;
-mod computed_postures;
-mod controller_readings;
-mod controller_tool;
-mod detections;
+mod controller;
 mod dry_run;
 mod estimator;
-mod evidence;
-mod exchanged_counts;
-mod free_poses;
 mod in_words;
-mod joint;
-mod lens_choice;
-mod local_errors;
-mod measure;
-mod measured_lengths;
-mod misread;
+mod joint_fit;
 mod mistakes;
-mod name_order;
-mod near_nominal;
+mod model_choice;
+mod observations;
 mod options;
-mod parts;
-mod places_exchanged;
-mod points_start;
-mod pose_comparison;
-mod repeated_rows;
-mod row_shift;
-mod rows_in_part;
-mod rows_of;
-mod second_pass;
-mod seen_image;
+mod photogrammetry;
+mod problem;
+mod run;
 mod selection;
 mod solution;
-mod staged;
-mod stand_alone;
 mod start;
 mod start_verdict;
-mod stated;
-mod suspects;
-mod touch_mistakes;
-mod turns;
 mod two_stage;
-mod unpredicted;
-mod unrelated_rows;
 mod verify;
 
 pub use crate::model::joint_terms::RobotModel;
-pub use build::{build, stated_covariance};
-pub use compare::{beside_two_stages, compare, truth_error};
-pub use comparison::{Comparison, ComparisonRow, HeldOut, TruthError};
-pub use controller_readings::{postures_are_computed, readings_of};
-pub use detections::{SeenSeries, Unused, detect_images, detect_stops, flat_field_drift, pictures, require_some};
+pub use bodies::touch_mistakes::touch_mistake;
+pub use controller::readings::{postures_are_computed, readings_of};
 pub use dry_run::dry_run;
 pub use estimator::Estimator;
-pub use evidence::identify;
-pub use free_poses::adjust_free_poses;
-pub use lens_choice::{choose_lens, depths_m};
-pub use measure::{MeasuredWithNotices, measure, measure_bodies};
+pub use model_choice::lens_choice::{choose_lens, depths_m};
+pub use observations::detections::{
+    SeenSeries, Unused, detect_images, detect_stops, flat_field_drift, pictures, require_some,
+};
+pub use observations::measure::{MeasuredWithNotices, measure, measure_bodies};
+pub use observations::seen_image::SeenImage;
+pub use observations::stated::CameraStart;
 pub use options::{JointNoise, MarkerTolerance, Options};
-pub use pose_comparison::{OtherBody, PoseComparison, PoseDifference, compare_poses};
-pub use seen_image::SeenImage;
+pub use photogrammetry::free_poses::adjust_free_poses;
+pub use photogrammetry::pose_comparison::{OtherBody, PoseComparison, PoseDifference, compare_poses};
+pub use photogrammetry::stand_alone::{PoseSigma, StandAlone, stand_alone};
+pub use problem::build::{build, stated_covariance};
+pub use run::identify;
 pub use selection::{Config, Parameters, Selection, StatedPrior};
 pub use solution::{Evidence, LensEvidence, Solution};
-pub use stand_alone::{PoseSigma, StandAlone, stand_alone};
 pub use start_verdict::{StartReached, StartVerdict};
-pub use stated::CameraStart;
-pub use touch_mistakes::touch_mistake;
-pub use two_stage::{Estimate, PoseStage, estimate_all, fit_joint, fit_poses, linear_step};
+pub use two_stage::compare::{beside_two_stages, compare, truth_error};
+pub use two_stage::comparison::{Comparison, ComparisonRow, HeldOut, TruthError};
+pub use two_stage::fit::{Estimate, PoseStage, estimate_all, fit_joint, fit_poses, linear_step};
 pub use verify::{JudgedImage, in_told_postures, verify_series};

@@ -1,11 +1,11 @@
 //! A robot model judged by a series that it was not fitted to: camera, hand-camera offset and plate are fitted, the robot is not.
 
-use super::computed_postures::{Before, told_by_images};
-use super::free_poses::free_poses_of;
+use super::controller::computed_postures::{Before, told_by_images};
+use super::joint_fit::unpredicted::nothing_held_out;
 use super::options::JointNoise;
-use super::start::{StartGiven, start_robot};
-use super::turns;
-use super::unpredicted::nothing_held_out;
+use super::photogrammetry::free_poses::free_poses_of;
+use super::start::robot::{StartGiven, start_robot};
+use super::start::turns;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
 use crate::error::{Code, Error, Result};

@@ -1,0 +1,93 @@
+//! When readings and what an instrument saw of a body do not fit: the usual mistakes in either, tried one by one, named where one of them
+//! explains it.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+
+use super::misfit::{FEWEST_POSES, SeenAt};
+use super::points_start::FEWEST_POINTS;
+use super::rows_of::rows_of_bodies;
+use crate::assess::Limits;
+use crate::diagnose::{Finding, Mistake, MistakeKind};
+use crate::error::Result;
+use crate::identify::mistakes::misread::all_misread;
+use crate::identify::mistakes::readings::{columns_undone, whole_and_parted};
+use crate::model::robot::Robot;
+use crate::problem::{Adjustment, BodySeen, Problem};
+
+/// What was seen with a mistake undone, and its name.
+type Undone = (Vec<SeenAt>, MistakeKind);
+
+/// Refuses measurements and readings that fit with one of the usual mistakes undone, and only then. `misfit` is the median misfit of poses
+/// (rad + m), or of points (m), with given readings.
+///
+/// # Errors
+/// The mistake that explains most.
+pub(super) fn name_mistake(
+    adjustment: &Adjustment,
+    measured: &[usize],
+    limits: &Limits,
+    misfit: impl Fn(&Robot, &[SeenAt]) -> f64 + Sync,
+) -> Result<()> {
+    let Adjustment { problem, state } = adjustment;
+    let robot = &state.robot;
+    let given: Vec<SeenAt> =
+        measured.iter().filter_map(|k| SeenAt::of(problem, &problem.body_measurements[*k])).collect();
+    let as_described = misfit(robot, &given);
+    if as_described < limits.suspicious_misfit || robot.chain.pose_coordinates().is_some() {
+        return Ok(());
+    }
+    let readings: Vec<Vec<f64>> = given.iter().map(|s| s.readings.clone()).collect();
+    let read_otherwise = all_misread().filter_map(|misread| {
+        let undone = |s: &SeenAt| Some(SeenAt { seen: misread.undone(s.seen)?, ..s.at(s.readings.clone()) });
+        Some((given.iter().map(undone).collect::<Option<Vec<_>>>()?, misread.kind()))
+    });
+    let of_columns = columns_undone(robot, &readings).into_iter().map(|(readings, kind)| {
+        let undone = given.iter().zip(readings).map(|(s, readings)| s.at(readings));
+        (undone.collect(), kind)
+    });
+    let undone: Vec<Undone> = read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, &given)).collect();
+    let tried = undone.into_par_iter().map(|(undone, kind)| (misfit(robot, &undone), kind));
+    let best = tried
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .filter(|(left, _)| *left < limits.mistake_explains * as_described && *left < limits.suspicious_misfit);
+    best.map_or(Ok(()), |(left, kind)| {
+        let instrument = &problem.instruments[given[0].instrument];
+        let of = instrument.place();
+        let rows_of = rows_of_bodies(adjustment, measured, limits);
+        let mistake = Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of };
+        Err(Finding::from(mistake).refusal())
+    })
+}
+
+/// Readings of the next stop, or the one before, in its series: of those in joints.csv, and of those that were measured. A stop at the end has none.
+fn rows_undone(problem: &Problem, robot: &Robot, given: &[SeenAt]) -> Vec<Undone> {
+    let all: Vec<usize> = (0..problem.stops.len()).collect();
+    let measured: Vec<usize> = given.iter().map(|s| s.stop).collect::<BTreeSet<usize>>().into_iter().collect();
+    let orders = if measured.len() < all.len() { vec![all, measured] } else { vec![all] };
+    // Few rows fit others by chance.
+    let are_points = given.iter().any(|s| matches!(s.seen, BodySeen::Point(_)));
+    let fewest = if are_points { 2 * FEWEST_POINTS } else { FEWEST_POSES + 1 };
+    let shifts = orders.iter().flat_map(|order| [true, false].map(|below| (order, below)));
+    let undone = shifts.flat_map(|(order, below)| {
+        let seen = given.iter().filter_map(|s| {
+            let own = order.binary_search(&s.stop).ok()?;
+            let other = &problem.stops[*order.get(if below { own + 1 } else { own.checked_sub(1)? })?];
+            let is_near = other.series == problem.stops[s.stop].series;
+            Some((s, other.posture.as_ref().filter(|_| is_near)?.readings.clone()))
+        });
+        let (seen, shifted): (Vec<&SeenAt>, Vec<Vec<f64>>) = seen.unzip();
+        if seen.len() < fewest {
+            return Vec::new();
+        }
+        let own: Vec<Vec<f64>> = seen.iter().map(|s| s.readings.clone()).collect();
+        let whole = MistakeKind::Rows { below, columns: Vec::new(), part: None };
+        let undone = whole_and_parted(robot, &own, (shifted, whole)).into_iter();
+        let at = move |(readings, kind): (Vec<Vec<f64>>, MistakeKind)| {
+            (seen.iter().zip(readings).map(|(s, readings)| s.at(readings)).collect(), kind)
+        };
+        undone.map(at).collect::<Vec<Undone>>()
+    });
+    undone.collect()
+}

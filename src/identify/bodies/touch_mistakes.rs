@@ -1,0 +1,410 @@
+//! When touches scatter far more than is stated: the usual mistakes, each undone and the touches fitted again (those that the closed form fits
+//! best), named where one of them explains it.
+//!
+//! Readings may be in another order, of another sign or of other rows; the places may be mirrored, or one of them wrong; the tool that was given
+//! may be another; the tool may have been bent, or the work object moved, between two touches. A place that may be wrong counts as unknown. The work object after some touch is
+//! `D` away from where it was: `D` brings its places, as given, to where they are found while they count as unknown.
+
+use std::cmp::Ordering;
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::points_start::each_place;
+use crate::assess::Limits;
+use crate::diagnose::{Finding, Mistake, MistakeKind, RowsOf};
+use crate::error::Code;
+use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touch, Touches, closed_form, fit};
+use crate::geom::{Pose, log_so3, rigid_fit};
+use crate::identify::mistakes::misread::all_misread;
+use crate::identify::mistakes::readings::mistakes_undone;
+use crate::problem::BodySeen;
+
+/// Of mistakes of one kind, those that are fitted: the closed form fits them best.
+const FITTED: usize = 3;
+
+/// Touches that are named.
+const NAMED: usize = 5;
+
+/// Touches with a mistake undone, what is known beside them, and what the mistake is.
+struct Undone {
+    touches: Touches,
+    given: Given,
+    what: What,
+}
+
+enum What {
+    Kind(MistakeKind),
+    /// This place, now an unknown contact, the last.
+    Place(Vector3<f64>),
+    /// The place of this touch alone, likewise.
+    Touch(usize, Vector3<f64>),
+    /// The tool that was given; now it is found.
+    GivenTool(Pose),
+    /// The tool, now the last body, from this posture on.
+    Tool {
+        from: usize,
+    },
+    /// The work object from this posture on, and how it was moved.
+    Work {
+        from: usize,
+        moved: Pose,
+    },
+    /// The place of the touches at these stops, or of those at others: any of them explains as much.
+    OneOf(Vec<String>),
+}
+
+impl What {
+    /// Stops of which a place counts as unknown.
+    fn stops(&self, touches: &Touches) -> Option<Vec<String>> {
+        let at = |is: &dyn Fn(usize, &Touch) -> bool| {
+            let all = touches.all.iter().enumerate();
+            Some(all.filter(|(k, touch)| is(*k, touch)).map(|(_, touch)| touch.stop.clone()).collect())
+        };
+        match self {
+            Self::Place(place) => at(&|_, touch| touch.seen == Seen::Point(*place)),
+            Self::Touch(one, _) => at(&|k, _| k == *one),
+            _ => None,
+        }
+    }
+}
+
+/// The mistake that explains why touches scatter; `None` where they do not, or none of them does. Where none does alone, it is looked for beside
+/// touches that fit least, one after the other, as long as these are few.
+pub fn touch_mistake(
+    robot: &KnownRobot,
+    touches: &Touches,
+    given: &Given,
+    (found, limits): (&FrameFit, &Limits),
+) -> Option<Mistake> {
+    if found.contradiction(limits) <= limits.touch_factor {
+        return None;
+    }
+    let most = (limits.share_of_images_left_out * touches.all.len() as f64) as usize;
+    let (mut rest, mut fitted, mut beside) = (touches.clone(), found.clone(), Vec::new());
+    loop {
+        if let Some((left, undone)) = explained(robot, &rest, given, (&fitted, limits)) {
+            let kind = named(&undone, &left, &rest);
+            // Of shifted rows one at the end has no partner.
+            if !matches!(kind, MistakeKind::Rows { .. }) {
+                let judged = undone.touches.all.iter().zip(&left.judged);
+                beside.extend(judged.filter(|(_, judged)| judged.left_out).map(|(touch, _)| touch.stop.clone()));
+            }
+            return Some(mistake(touches, kind, (found.rms_m, left.rms_m), &beside));
+        }
+        let out = fit_least(robot, &rest, given, &fitted)?;
+        beside.extend(out.iter().map(|k| rest.all[*k].stop.clone()));
+        if beside.len() > most {
+            return None;
+        }
+        rest = without(&rest, &out);
+        fitted = fit(robot, &rest, given, limits).ok()?;
+        let left = fitted.contradiction(limits);
+        if left <= limits.touch_factor && left < limits.mistake_explains * found.contradiction(limits) {
+            let kind = MistakeKind::Poses {
+                code: Code::PlaceContradicted,
+                what: format!("the touches at {} were of other places than is said", beside.join(", ")),
+                remedy: "correct their rows in contacts.csv, or leave them out".to_owned(),
+            };
+            return Some(mistake(touches, kind, (found.rms_m, fitted.rms_m), &[]));
+        }
+    }
+}
+
+/// With the stops that fit no more beside it.
+fn mistake(touches: &Touches, kind: MistakeKind, (misfit, left): (f64, f64), beside: &[String]) -> Mistake {
+    let frame = touches.frame.as_ref().map_or_else(String::new, |frame| format!(" in frame {frame}"));
+    let alone = Mistake {
+        kind,
+        of: format!("touches{frame}"),
+        misfit,
+        misfit_undone: Some(left),
+        by_images: false,
+        rows_of: RowsOf::Readings,
+    };
+    if beside.is_empty() {
+        return alone;
+    }
+    let found = Finding::from(alone.clone());
+    let what = format!("{}; beside it {} fits no place that is said", found.seen(), beside.join(", "));
+    let kind = MistakeKind::Poses { code: found.code(), what, remedy: found.remedy() };
+    Mistake { kind, ..alone }
+}
+
+/// The touches that the fit left out, else that without which the others fit best.
+fn fit_least(robot: &KnownRobot, touches: &Touches, given: &Given, fitted: &FrameFit) -> Option<Vec<usize>> {
+    let all = 0..touches.all.len();
+    let out: Vec<usize> = all.clone().filter(|&k| fitted.judged[k].left_out).collect();
+    if !out.is_empty() {
+        return Some(out);
+    }
+    let left = |k: usize| Some((closed_form(robot, &without(touches, &[k]), given)?.0, k));
+    let least = all.filter_map(left).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(vec![least.1])
+}
+
+fn without(touches: &Touches, out: &[usize]) -> Touches {
+    let rest = touches.all.iter().enumerate().filter(|(k, _)| !out.contains(k));
+    Touches { all: rest.map(|(_, touch)| touch.clone()).collect(), ..touches.clone() }
+}
+
+/// The mistake that explains most, and what it leaves.
+fn explained(
+    robot: &KnownRobot,
+    touches: &Touches,
+    given: &Given,
+    (found, limits): (&FrameFit, &Limits),
+) -> Option<(FrameFit, Undone)> {
+    let fewest = limits.fewest_touches;
+    let from = fewest..(touches.postures.len() + 1).saturating_sub(fewest);
+    let with_given = |(touches, what): (Touches, What)| Undone { touches, given: *given, what };
+    let [places, single] = other_places(touches);
+    let tools = from.clone().filter(|_| given.tool.is_none()).map(|from| other_tool(touches, from));
+    let works = from.filter_map(|from| {
+        let (apart, known) = with_unknown_places(touches, |touch| touch.posture >= from);
+        work_moved(touches, from, &known, &closed_form(robot, &apart, given)?.1)
+    });
+    let kinds = [
+        read_otherwise(robot, touches).map(with_given).collect(),
+        places.into_iter().map(with_given).collect(),
+        single.into_iter().map(with_given).collect(),
+        tools.map(with_given).collect(),
+        works.map(with_given).collect(),
+        given.tool.map(|tool| without_tool(touches, given, tool)).into_iter().collect::<Vec<Undone>>(),
+    ];
+    let all: Vec<Undone> = kinds.into_iter().flat_map(|undone| nearest(robot, undone)).collect();
+    let explains = |fit: &FrameFit| explains(fit, found, limits);
+    let tried = |undone: Undone| {
+        fit(robot, &undone.touches, &undone.given, limits).ok().filter(explains).map(|fit| (fit, undone))
+    };
+    let (best, undone) =
+        all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a, limits), rank(b, limits)))?;
+    let one_of = one_of(robot, touches, given, (&best, &undone.what, found, limits));
+    Some((best, Undone { what: one_of.map_or(undone.what, What::OneOf), ..undone }))
+}
+
+/// True where a fit leaves little of what contradicts another.
+fn explains(fit: &FrameFit, found: &FrameFit, limits: &Limits) -> bool {
+    fit.contradiction(limits) < limits.mistake_explains * found.contradiction(limits)
+        && fit.rms_m < limits.touch_sigma_m
+}
+
+/// Every known place as unknown, and that of every touch alone.
+fn other_places(touches: &Touches) -> [Vec<(Touches, What)>; 2] {
+    let places = known_places(touches.all.iter()).into_iter().map(|place| {
+        let (other, _) = with_unknown_places(touches, |touch| touch.seen == Seen::Point(place));
+        (other, What::Place(place))
+    });
+    let single = (0..touches.all.len()).filter_map(|k| of_another_place(touches, k));
+    [places.collect(), single.collect()]
+}
+
+/// The stops of one of which the place is wrong, where another place, or touch, explains nearly as much as the best: it must leave so much more that
+/// the best explains it away. `None` where the best alone does.
+fn one_of(
+    robot: &KnownRobot,
+    touches: &Touches,
+    given: &Given,
+    (best, what, found, limits): (&FrameFit, &What, &FrameFit, &Limits),
+) -> Option<Vec<String>> {
+    let own = what.stops(touches)?;
+    let is_rival = |(touches, _): &(Touches, What)| {
+        let left = fit(robot, touches, given, limits).ok().filter(|fit| explains(fit, found, limits));
+        left.is_some_and(|left| best.contradiction(limits) > limits.mistake_explains * left.contradiction(limits))
+    };
+    let others: Vec<(Touches, What)> = other_places(touches).into_iter().flatten().collect();
+    let rivals = others.into_par_iter().filter(is_rival).filter_map(|(_, what)| what.stops(touches));
+    let stops: BTreeSet<String> = rivals.flatten().chain(own.clone()).collect();
+    (stops.len() > own.len()).then(|| stops.into_iter().collect())
+}
+
+/// Those that the closed form fits best.
+fn nearest(robot: &KnownRobot, undone: Vec<Undone>) -> Vec<Undone> {
+    let misses = |undone: Undone| closed_form(robot, &undone.touches, &undone.given).map(|(rms_m, _)| (rms_m, undone));
+    let mut all: Vec<(f64, Undone)> = undone.into_par_iter().filter_map(misses).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all.into_iter().take(FITTED).map(|(_, undone)| undone).collect()
+}
+
+/// What leaves fewer touches out is better, then what takes no more unknowns, then what fits better.
+fn rank((fit, undone): &(FrameFit, Undone), limits: &Limits) -> (usize, bool, f64) {
+    let left_out = fit.judged.iter().filter(|j| j.left_out).count();
+    (left_out, !matches!(undone.what, What::Kind(_)), fit.contradiction(limits))
+}
+
+fn by_rank(a: (usize, bool, f64), b: (usize, bool, f64)) -> Ordering {
+    (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2))
+}
+
+/// Other readings, or all places otherwise.
+fn read_otherwise(robot: &KnownRobot, touches: &Touches) -> impl Iterator<Item = (Touches, What)> {
+    let readings: Vec<Vec<f64>> = touches.postures.iter().map(|p| p.readings.clone()).collect();
+    let of_readings = mistakes_undone(robot.exported(), &readings).into_iter().map(|(readings, kind)| {
+        let mut undone = touches.clone();
+        undone.postures.iter_mut().zip(readings).for_each(|(p, readings)| p.readings = readings);
+        (undone, What::Kind(kind))
+    });
+    let of_places = all_misread().filter(|_| touches.frame.is_some()).filter_map(|misread| {
+        let mut undone = touches.clone();
+        for touch in &mut undone.all {
+            touch.seen = match touch.seen {
+                Seen::Point(point) => seen(misread.undone(BodySeen::Point(point))?),
+                Seen::Pose(pose) => seen(misread.undone(BodySeen::Pose(pose))?),
+                unknown @ Seen::Unknown(_) => unknown,
+            };
+        }
+        Some((undone, What::Kind(misread.kind())))
+    });
+    of_readings.chain(of_places)
+}
+
+fn seen(seen: BodySeen) -> Seen {
+    match seen {
+        BodySeen::Point(point) => Seen::Point(point),
+        BodySeen::Pose(pose) => Seen::Pose(pose),
+    }
+}
+
+/// Places of points that are known, each once.
+fn known_places<'a>(touches: impl Iterator<Item = &'a Touch>) -> Vec<Vector3<f64>> {
+    each_place(touches.filter_map(|touch| match touch.seen {
+        Seen::Point(place) => Some(place),
+        Seen::Pose(_) | Seen::Unknown(_) => None,
+    }))
+}
+
+/// The known places of some touches as unknown contacts, the last, and where they are said to be.
+fn with_unknown_places(touches: &Touches, of: impl Fn(&Touch) -> bool) -> (Touches, Vec<Vector3<f64>>) {
+    let mut apart = touches.clone();
+    let known = known_places(touches.all.iter().filter(|t| of(t)));
+    for touch in apart.all.iter_mut().filter(|t| of(t)) {
+        let Seen::Point(place) = touch.seen else { continue };
+        let index = known.iter().position(|p| *p == place).unwrap_or_default();
+        touch.seen = Seen::Unknown(touches.contacts.len() + index);
+    }
+    apart.contacts.extend(known.iter().map(|_| String::new()));
+    (apart, known)
+}
+
+fn of_another_place(touches: &Touches, k: usize) -> Option<(Touches, What)> {
+    let Seen::Point(place) = touches.all[k].seen else { return None };
+    let mut undone = touches.clone();
+    undone.all[k].seen = Seen::Unknown(touches.contacts.len());
+    undone.contacts.push(String::new());
+    Some((undone, What::Touch(k, place)))
+}
+
+fn without_tool(touches: &Touches, given: &Given, tool: Pose) -> Undone {
+    Undone { touches: touches.clone(), given: Given { tool: None, ..*given }, what: What::GivenTool(tool) }
+}
+
+fn other_tool(touches: &Touches, from: usize) -> (Touches, What) {
+    let mut undone = touches.clone();
+    let bodies = touches.bodies.len();
+    undone.bodies.extend_from_within(..);
+    undone.all.iter_mut().filter(|t| t.posture >= from).for_each(|t| t.body += bodies);
+    (undone, What::Tool { from })
+}
+
+fn work_moved(
+    touches: &Touches,
+    from: usize,
+    known: &[Vector3<f64>],
+    places: &[Vector3<f64>],
+) -> Option<(Touches, What)> {
+    let found = places.get(touches.contacts.len()..)?;
+    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = known.iter().copied().zip(found.iter().copied()).collect();
+    let moved = rigid_fit(&pairs).filter(|_| pairs.len() > 2)?;
+    let mut undone = touches.clone();
+    for touch in undone.all.iter_mut().filter(|t| t.posture >= from) {
+        touch.seen = match touch.seen {
+            Seen::Point(place) => Seen::Point(moved.transform(&place)),
+            Seen::Pose(pose) => Seen::Pose(moved * pose),
+            unknown @ Seen::Unknown(_) => unknown,
+        };
+    }
+    Some((undone, What::Work { from, moved }))
+}
+
+fn named(undone: &Undone, left: &FrameFit, touches: &Touches) -> MistakeKind {
+    let first = |from: usize| {
+        let touch = touches.all.iter().find(|t| t.posture == from);
+        touch.map_or_else(String::new, |t| t.stop.clone())
+    };
+    let (code, what, remedy) = match &undone.what {
+        What::Kind(kind) => return kind.clone(),
+        What::Place(place) => {
+            let found = left.places.last().copied().unwrap_or(*place);
+            let of: BTreeSet<&str> =
+                touches.all.iter().filter(|t| t.seen == Seen::Point(*place)).map(|t| t.stop.as_str()).collect();
+            let more = if of.len() > NAMED { ", .." } else { "" };
+            let names: Vec<&str> = of.into_iter().take(NAMED).collect();
+            let what = format!(
+                "the place {} that was touched at {}{more} is at {} by the others, {:.2} mm away",
+                in_metres(place),
+                names.join(", "),
+                in_metres(&found),
+                1e3 * (found - place).norm()
+            );
+            (Code::PlaceContradicted, what, "correct it in contacts.csv, or touch the point that was meant".to_owned())
+        }
+        What::Touch(k, place) => {
+            let found = left.places.last().copied().unwrap_or(*place);
+            let what = format!(
+                "the touch at {} was not of the place {}: by the others it was at {}, {:.2} mm away",
+                touches.all[*k].stop,
+                in_metres(place),
+                in_metres(&found),
+                1e3 * (found - place).norm()
+            );
+            (Code::PlaceContradicted, what, "correct its row in contacts.csv, or leave it out".to_owned())
+        }
+        What::OneOf(stops) => {
+            let what = format!(
+                "one of the touches at {} was not of the place that is said: whichever is taken as wrong, the others fit, and they do not tell which",
+                stops.join(", ")
+            );
+            let remedy = "touch these points again, and some more with the tip turned another way";
+            (Code::PlaceContradicted, what, remedy.to_owned())
+        }
+        What::GivenTool(tool) => {
+            let found = &left.tools[0];
+            let what = format!(
+                "the tool that was given misses: by the touches its point is at {} on the tip, {:.2} mm away",
+                in_metres(&found.translation),
+                1e3 * (found.translation - tool.translation).norm()
+            );
+            let remedy = "leave --tool out: the touches find it; or give the frame of the tool as it is mounted now";
+            (Code::ToolContradicted, what, remedy.to_owned())
+        }
+        What::Tool { from } => {
+            let half = touches.bodies.len();
+            let moved = left.tools[half].translation - left.tools[0].translation;
+            let what = format!(
+                "from {} on the point of the tool is {:.2} mm elsewhere on the tip: it was bent, exchanged or came loose",
+                first(*from),
+                1e3 * moved.norm()
+            );
+            let remedy = format!("use the touches before {}, or those from it on", first(*from));
+            (Code::TargetDisplaced, what, remedy)
+        }
+        What::Work { from, moved } => {
+            let places: Vec<Vector3<f64>> = touches.placed().map(|(_, place)| place).collect();
+            let middle = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
+            let what = format!(
+                "from {} on the work object stands {:.2} mm, {:.2} mrad elsewhere: it was moved, or the base of the robot, or the zero of a joint slipped",
+                first(*from),
+                1e3 * (moved.transform(&middle) - middle).norm(),
+                1e3 * log_so3(&moved.rotation).norm()
+            );
+            (Code::WorkDisplaced, what, format!("use the touches before {}, or those from it on", first(*from)))
+        }
+    };
+    MistakeKind::Poses { code, what, remedy }
+}
+
+/// A place in words.
+pub(super) fn in_metres(place: &Vector3<f64>) -> String {
+    format!("({:.4}, {:.4}, {:.4}) m", place.x, place.y, place.z)
+}

@@ -1,0 +1,409 @@
+//! Which posture every pose of a controller means, by the images.
+//!
+//! A pose is reached in up to eight postures. The nominal robot is at the same place in all of them, the real one is not: with the derivatives
+//! `G_ic` of the camera pose at posture `c` of stop `i`, and `e_i` from the nominal pose to that of the images, wanted are the parameters `x` and
+//! the choice with the least
+//!
+//! ```text
+//! sum_i min_c (e_i - G_ic x)' V_ic^-1 (e_i - G_ic x) + x' P^-1 x
+//! ```
+//!
+//! `x` is fitted to a choice and the choice made by `x` in turns (S. Lloyd 1957), from the postures nearest to those before and from random
+//! ones; then every stop takes the posture that all others predict best, in turns. Where the axes of a wrist meet, all stops with the wrist
+//! turned over are a robot as likely as the first: the images do not tell which.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{DMatrix, DVector, Matrix6};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use crate::assess::Limits;
+use crate::diagnose::ComputedPostures;
+use crate::error::Result;
+use crate::fit::FreePoses;
+use crate::identify::photogrammetry::free_poses::free_poses_of;
+use crate::identify::start::robot::{StartGiven, start_robot};
+use crate::linalg::SymmetricFactor;
+use crate::model::robot::{LinearOrigins, Posture, Robot};
+use crate::problem::{Adjustment, MeasuredSeries, State, TakenFrom};
+use crate::stage::stage;
+
+/// Noise of the readings of the stops that are compared, rad or m.
+const JOINT_SIGMA: f64 = 1e-4;
+/// Random choices that are started from.
+const STARTS: u64 = 64;
+/// The best choices of fitting and choosing in turns, from which every stop is chosen by the others.
+const DESCENDED: usize = 16;
+/// Most turns of fitting and choosing.
+const TURNS: usize = 50;
+/// Share of the information that holds what nothing tells.
+const HELD: f64 = 1e-12;
+
+/// The robot at its start beside free camera poses: what stops are compared by.
+pub(super) struct Compared {
+    pub adjustment: Adjustment,
+    free: FreePoses,
+    columns: Vec<usize>,
+    /// Prior information of the parameters.
+    pub prior: DVector<f64>,
+    /// Images of every stop.
+    pub stops: Vec<Vec<usize>>,
+}
+
+impl Compared {
+    /// What is `found` with series of which some have readings that were computed from poses; `None` where all were read. `hold` holds the columns
+    /// that are not to be fitted.
+    pub fn with<T>(
+        stage_name: &'static str,
+        robot: &Robot,
+        (series, limits): (&[MeasuredSeries], &Limits),
+        hold: impl FnOnce(&mut Adjustment) -> Result<()>,
+        found: impl FnOnce(&Self) -> Option<T>,
+    ) -> Option<T> {
+        if !series.iter().any(MeasuredSeries::readings_are_computed) {
+            return None;
+        }
+        let _stage = stage(stage_name);
+        found(&Self::of(robot, series, limits, hold)?)
+    }
+
+    fn of(
+        robot: &Robot,
+        series: &[MeasuredSeries],
+        limits: &Limits,
+        hold: impl FnOnce(&mut Adjustment) -> Result<()>,
+    ) -> Option<Self> {
+        let (mut adjustment, free, mut verdicts) = free_poses_of(robot, series, limits, hold).ok()?;
+        start_robot(&mut adjustment, &free, StartGiven { series, groups: &[], limits }, &mut verdicts).ok()?;
+        let layout = &adjustment.problem.layout;
+        let columns: Vec<usize> = (0..layout.theta_len()).filter(|&c| layout.columns[c].free).collect();
+        let prior = columns.iter().map(|&c| layout.columns[c].prior_sigma.powi(-2));
+        let prior = DVector::from_iterator(columns.len(), prior);
+        let mut by_stop: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for i in adjustment.problem.used_on_robot() {
+            by_stop.entry(adjustment.problem.images[i].stop).or_default().push(i);
+        }
+        let stops = by_stop.into_values().collect();
+        Some(Self { adjustment, free, columns, prior, stops })
+    }
+
+    /// `V^-1/2 G` and `V^-1/2 e` of the images of a stop at some readings, by the unknowns of a state.
+    pub fn seen_at(
+        &self,
+        (state, origins): (&State, &LinearOrigins),
+        images: &[usize],
+        readings: &[f64],
+    ) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let problem = &self.adjustment.problem;
+        let read = problem.stops[problem.images[*images.first()?].stop].posture.as_ref()?;
+        let (posture, zeros) = (approached(read, readings), vec![0.0; readings.len()]);
+        let mut g = DMatrix::zeros(6 * images.len(), self.columns.len());
+        let mut e = DVector::zeros(6 * images.len());
+        for (k, &i) in images.iter().enumerate() {
+            let pose = self.free.poses[i].as_ref()?;
+            let from = TakenFrom::rigid(&posture, &zeros);
+            let chained = state.chained_from(origins, &problem.layout, &problem.images[i], from)?;
+            let by_readings = chained.d_latent.columns(0, readings.len()) * JOINT_SIGMA;
+            let noise =
+                pose.covariance + Matrix6::from_column_slice((&by_readings * by_readings.transpose()).as_slice());
+            let root = noise.cholesky()?.l().try_inverse()?;
+            e.rows_mut(6 * k, 6).copy_from(&(root * (chained.pose.inverse() * pose.camera_from_plate).log()));
+            g.rows_mut(6 * k, 6).copy_from(&(root * chained.d_theta.select_columns(&self.columns)));
+        }
+        Some((g, e))
+    }
+}
+
+/// What the images say of one posture of a stop.
+struct Candidate {
+    readings: Vec<f64>,
+    /// `V^-1/2 G` and `V^-1/2 e` of all images of the stop.
+    g: DMatrix<f64>,
+    e: DVector<f64>,
+}
+
+impl Candidate {
+    fn equations(&self) -> (&DMatrix<f64>, &DVector<f64>) {
+        (&self.g, &self.e)
+    }
+}
+
+/// A stop whose pose was read.
+struct Stop {
+    /// Series and row of everything that was seen there.
+    rows: Vec<(usize, usize)>,
+    /// The first is that of the series as it stands.
+    candidates: Vec<Candidate>,
+}
+
+/// A choice of postures that no single stop would change.
+#[derive(Clone, PartialEq)]
+struct Choice {
+    postures: Vec<usize>,
+    cost: f64,
+}
+
+/// The stops, and the prior information of the parameters.
+struct Stops {
+    all: Vec<Stop>,
+    prior: DVector<f64>,
+}
+
+/// What the postures of a series are before the images tell them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::identify) enum Before {
+    /// Those nearest to the stops before.
+    Nearest,
+    /// Those of a fit, nearly all of them right.
+    Fitted,
+}
+
+/// The series with the postures that the images tell; unchanged where readings were read. `hold` holds the columns that are not to be fitted.
+pub(in crate::identify) fn told_by_images<'a>(
+    robot: &Robot,
+    (series, from): (&'a [MeasuredSeries], Before),
+    limits: &Limits,
+    hold: impl FnOnce(&mut Adjustment) -> Result<()>,
+) -> (Cow<'a, [MeasuredSeries]>, Option<Told>) {
+    let found = Compared::with("postures", robot, (series, limits), hold, |compared| {
+        let stops = Stops::of(compared, series)?;
+        let chosen = stops.chosen(from, limits)?;
+        Some((stops, chosen))
+    });
+    let Some((stops, (chosen, is_open))) = found else { return (Cow::Borrowed(series), None) };
+    let mut told = series.to_vec();
+    let mut changed = 0;
+    for (stop, &c) in stops.all.iter().zip(&chosen.postures).filter(|(_, c)| **c > 0) {
+        for &(s, row) in &stop.rows {
+            let MeasuredSeries { stops, postures, .. } = &mut told[s];
+            let before = stops[row].readings.replace(stop.candidates[c].readings.clone());
+            if let Some((other, before)) = postures[row].get_mut(c - 1).zip(before) {
+                *other = before;
+            }
+        }
+        changed += 1;
+    }
+    let count = stops.all.iter().filter(|stop| series[stop.rows[0].0].readings_are_computed()).count();
+    (Cow::Owned(told), Some(Told { stops: count, changed, is_open }))
+}
+
+/// What the images told of the postures.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::identify) struct Told {
+    /// Stops whose poses were read.
+    pub stops: usize,
+    /// Stops that are in another posture now.
+    pub changed: usize,
+    /// Whether other choices at many stops together are as good.
+    pub is_open: bool,
+}
+
+impl Told {
+    /// What is to be said where the series were `given` and are `told` now.
+    pub fn finding(&self, given: &[MeasuredSeries], told: &[MeasuredSeries]) -> ComputedPostures {
+        // Cameras at the same stops say it once.
+        let mut stops: BTreeSet<(&str, usize)> = BTreeSet::new();
+        let mut others: Vec<String> = Vec::new();
+        for (given, told) in given.iter().zip(told) {
+            let run = given.run.as_deref().unwrap_or(&given.name);
+            let turned = given.stops.iter().zip(&told.stops).filter(|(g, t)| g.readings != t.readings);
+            others.extend(turned.filter(|(g, _)| stops.insert((run, g.row))).map(|(g, _)| g.image.clone()));
+        }
+        let series = given.iter().filter(|s| s.readings_are_computed()).map(|s| s.name.clone()).collect();
+        ComputedPostures { series, stops: self.stops, others, is_open: self.is_open }
+    }
+}
+
+impl Stops {
+    fn of(compared: &Compared, series: &[MeasuredSeries]) -> Option<Self> {
+        let of = |images: &Vec<usize>| stop(compared, series, images);
+        let all: Vec<Stop> = compared.stops.par_iter().filter_map(of).collect();
+        (!all.is_empty()).then_some(Self { all, prior: compared.prior.clone() })
+    }
+
+    /// The best choice, of those that are as good the one with most postures as they are, from those of a fit the one nearest to it; and whether
+    /// one that is as good is quite another.
+    fn chosen(&self, from: Before, limits: &Limits) -> Option<(Choice, bool)> {
+        let first = std::iter::once(self.settled(vec![0; self.all.len()]));
+        let random = |seed| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            self.settled(self.all.iter().map(|s| rng.random_range(0..s.candidates.len())).collect())
+        };
+        let random: Vec<Option<Choice>> = (0..STARTS).into_par_iter().map(random).collect();
+        let mut all: Vec<Choice> = Vec::new();
+        for choice in first.chain(random).flatten() {
+            if !all.contains(&choice) {
+                all.push(choice);
+            }
+        }
+        all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        all.truncate(DESCENDED);
+        let all: Vec<Choice> = all.into_par_iter().filter_map(|c| self.descended(c.postures)).collect();
+        let base = match from {
+            Before::Nearest => all.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?.clone(),
+            Before::Fitted => self.descended(vec![0; self.all.len()])?,
+        };
+        let equations: usize = self.all.iter().map(|s| s.candidates[0].e.len()).sum();
+        let as_good = 2.0 * limits.decisive_log_odds * (base.cost / equations as f64).max(1.0);
+        let mut best = vec![self.without_doubtful(base.postures, as_good)?];
+        for choice in all.into_iter().filter(|c| c.cost <= base.cost + as_good) {
+            let postures = self.without_doubtful(choice.postures, as_good)?;
+            if !best.contains(&postures) {
+                best.push(postures);
+            }
+        }
+        let kept = |postures: &&Vec<usize>| postures.iter().filter(|p| **p == 0).count();
+        let postures = match from {
+            Before::Nearest => best.iter().max_by_key(kept)?,
+            Before::Fitted => &best[0],
+        };
+        let others = |other: &Vec<usize>| other.iter().zip(postures).filter(|(a, b)| a != b).count();
+        let many = limits.open_postures * self.all.len() as f64;
+        let is_open = best.iter().any(|other| others(other) as f64 > many);
+        Some((self.choice(postures.clone())?, is_open))
+    }
+
+    /// What a choice says of the parameters.
+    fn told_by(&self, postures: &[usize]) -> Knowledge {
+        let mut known = Knowledge::of_priors(&self.prior);
+        self.all.iter().zip(postures).for_each(|(stop, &c)| known.add(stop.candidates[c].equations(), 1.0));
+        known
+    }
+
+    /// With its cost.
+    fn choice(&self, postures: Vec<usize>) -> Option<Choice> {
+        let known = self.told_by(&postures);
+        let x = known.factor()?.solve(&known.rhs);
+        Some(Choice { postures, cost: known.squares - known.rhs.dot(&x) })
+    }
+
+    /// Fits and chooses in turns.
+    fn settled(&self, mut postures: Vec<usize>) -> Option<Choice> {
+        for _ in 0..TURNS {
+            let known = self.told_by(&postures);
+            let x = known.factor()?.solve(&known.rhs);
+            let next: Vec<usize> = self.all.iter().map(|s| s.nearest(&x)).collect();
+            if next == postures {
+                return Some(Choice { postures, cost: known.squares - known.rhs.dot(&x) });
+            }
+            postures = next;
+        }
+        None
+    }
+
+    /// Every stop in the posture that all others predict best, in turns.
+    fn descended(&self, mut postures: Vec<usize>) -> Option<Choice> {
+        let mut known = self.told_by(&postures);
+        for _ in 0..TURNS {
+            let mut is_changed = false;
+            for (stop, c) in self.all.iter().zip(&mut postures) {
+                known.add(stop.candidates[*c].equations(), -1.0);
+                let costs = stop.predicted(&known)?;
+                let best = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(*c);
+                if costs[best] < costs[*c] {
+                    *c = best;
+                    is_changed = true;
+                }
+                known.add(stop.candidates[*c].equations(), 1.0);
+            }
+            if !is_changed {
+                break;
+            }
+        }
+        self.choice(postures)
+    }
+
+    /// With every stop that it hardly matters to as it was.
+    fn without_doubtful(&self, mut postures: Vec<usize>, as_good: f64) -> Option<Vec<usize>> {
+        let mut known = self.told_by(&postures);
+        for (stop, c) in self.all.iter().zip(&mut postures).filter(|(_, c)| **c > 0) {
+            known.add(stop.candidates[*c].equations(), -1.0);
+            let costs = stop.predicted(&known)?;
+            if costs[0] <= costs[*c] + as_good {
+                *c = 0;
+            }
+            known.add(stop.candidates[*c].equations(), 1.0);
+        }
+        Some(postures)
+    }
+}
+
+/// Normal equations of the parameters.
+pub(super) struct Knowledge {
+    information: DMatrix<f64>,
+    pub rhs: DVector<f64>,
+    pub squares: f64,
+}
+
+impl Knowledge {
+    pub fn of_priors(prior: &DVector<f64>) -> Self {
+        let n = prior.len();
+        Self { information: DMatrix::from_diagonal(prior), rhs: DVector::zeros(n), squares: 0.0 }
+    }
+
+    /// Takes a posture of a stop in, or by a weight of -1 out again.
+    pub fn add(&mut self, (g, e): (&DMatrix<f64>, &DVector<f64>), weight: f64) {
+        self.information.gemm_tr(weight, g, g, 1.0);
+        self.rhs.gemv_tr(weight, g, e, 1.0);
+        self.squares += weight * e.norm_squared();
+    }
+
+    pub fn factor(&self) -> Option<SymmetricFactor> {
+        let mut n = self.information.clone();
+        let held = HELD * n.diagonal().max();
+        (0..n.nrows()).for_each(|k| n[(k, k)] += held);
+        SymmetricFactor::new(&n).ok()
+    }
+}
+
+impl Stop {
+    fn nearest(&self, x: &DVector<f64>) -> usize {
+        let costs: Vec<f64> = self.candidates.iter().map(|c| (&c.e - &c.g * x).norm_squared()).collect();
+        (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0)
+    }
+
+    /// What every posture adds to the cost of the other stops: with `r = e - G x` and `W = 1 + G N^-1 G'` by their `x` and `N`, `r' W^-1 r`.
+    fn predicted(&self, others: &Knowledge) -> Option<Vec<f64>> {
+        let factor = others.factor()?;
+        let x = factor.solve(&others.rhs);
+        let cost = |Candidate { g, e, .. }: &Candidate| {
+            let w = DMatrix::identity(e.len(), e.len()) + g * factor.solve_many(&g.transpose());
+            let r = e - g * &x;
+            Some(r.dot(&w.cholesky()?.solve(&r)))
+        };
+        self.candidates.iter().map(cost).collect()
+    }
+}
+
+/// What the images of one stop say of its postures.
+fn stop(compared: &Compared, series: &[MeasuredSeries], images: &[usize]) -> Option<Stop> {
+    let Adjustment { problem, state } = &compared.adjustment;
+    let row = |&i: &usize| {
+        let image = &problem.images[i];
+        let row = series[image.series].stops.iter().position(|s| s.image == image.name)?;
+        Some((image.series, row))
+    };
+    let rows: Vec<(usize, usize)> = images.iter().filter_map(row).collect();
+    let &(s, row) = rows.first()?;
+    let own = series[s].stops[row].readings.clone()?;
+    let others = series[s].postures.get(row).cloned().unwrap_or_default();
+    let origins = state.robot.linear_origins();
+    let of = |readings: Vec<f64>| {
+        let (g, e) = compared.seen_at((state, &origins), images, &readings)?;
+        Some(Candidate { readings, g, e })
+    };
+    let candidates = std::iter::once(own).chain(others).map(of).collect::<Option<Vec<_>>>()?;
+    Some(Stop { rows, candidates })
+}
+
+/// A stop in another posture than that in which it was `read`, reached from the same stop before.
+fn approached(read: &Posture, readings: &[f64]) -> Posture {
+    let from_there = |approach: &Vec<f64>| {
+        let before = read.readings.iter().zip(approach).map(|(q, a)| q - a);
+        readings.iter().zip(before).map(|(q, before)| q - before).collect()
+    };
+    Posture { readings: readings.to_vec(), approach: read.approach.as_ref().map(from_there) }
+}

@@ -1,0 +1,12 @@
+//! When what was read and what was seen do not fit: which usual mistake explains it.
+//!
+//! `readings`, `name_order` and `misread` undo mistakes of readings and of places; `suspects`, `row_shift` and `breaks` try them on images, in whole
+//! series and in parts.
+
+pub(super) mod breaks;
+pub(super) mod misread;
+mod name_order;
+pub(super) mod parts;
+pub(super) mod readings;
+mod row_shift;
+pub(super) mod suspects;

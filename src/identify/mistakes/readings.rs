@@ -1,0 +1,95 @@
+//! The usual mistakes in joint readings, each undone.
+
+use crate::diagnose::MistakeKind;
+use crate::model::robot::Robot;
+use crate::series::{LENGTH_UNITS, LengthUnit};
+use crate::urdf::JointKind;
+
+/// The readings of all stops with one mistake undone, and its name.
+pub(super) type Undone = (Vec<Vec<f64>>, MistakeKind);
+
+/// Every one of a single joint, of two or three, of all, and of rows.
+pub(in crate::identify) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> {
+    let of_rows = shifted_rows(given).into_iter().flat_map(|shifted| whole_and_parted(robot, given, shifted));
+    columns_undone(robot, given).into_iter().chain(of_rows).collect()
+}
+
+/// Those of columns.
+pub(in crate::identify) fn columns_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> {
+    let (names, kinds) = (&robot.chain.readings, &robot.chain.reading_kinds);
+    let n = names.len();
+    let named = |joints: &[usize]| joints.iter().map(|&k| names[k].clone()).collect();
+    let mut all = Vec::new();
+    let mut add = |mistake, change: &dyn Fn(&mut Vec<f64>)| {
+        let mut changed = given.to_vec();
+        changed.iter_mut().for_each(change);
+        all.push((changed, mistake));
+    };
+    let units = [(true, 1f64.to_radians()), (false, 1f64.to_degrees())];
+    for k in 0..n {
+        add(MistakeKind::Signs(named(&[k])), &|q| q[k] = -q[k]);
+        for other in k + 1..n {
+            add(MistakeKind::Columns(named(&[k, other])), &|q| q.swap(k, other));
+            add(MistakeKind::Signs(named(&[k, other])), &|q| (q[k], q[other]) = (-q[k], -q[other]));
+            for third in other + 1..n {
+                for (a, b) in [(other, third), (third, other)] {
+                    add(MistakeKind::Columns(named(&[k, a, b])), &|q| (q[k], q[a], q[b]) = (q[a], q[b], q[k]));
+                }
+            }
+        }
+        if k > 0 && [kinds[k - 1], kinds[k]] == [JointKind::Revolute; 2] {
+            for (is_sum, sign) in [(true, 1.0), (false, -1.0)] {
+                let joints = [k, k - 1].map(|joint| names[joint].clone());
+                add(MistakeKind::Coupled { joints, is_sum }, &|q| q[k] += sign * q[k - 1]);
+            }
+        }
+        if kinds[k] == JointKind::Prismatic {
+            for LengthUnit { name, metres, .. } in LENGTH_UNITS {
+                add(MistakeKind::SlideUnit { joint: names[k].clone(), unit: name, metres }, &|q| q[k] *= metres);
+            }
+        }
+        if kinds[k] == JointKind::Revolute {
+            for (are_degrees, factor) in units {
+                let joint = Some(names[k].clone());
+                add(MistakeKind::Unit { joint, are_degrees }, &|q| q[k] *= factor);
+            }
+        }
+    }
+    for (are_degrees, factor) in units {
+        add(MistakeKind::Unit { joint: None, are_degrees }, &|q| {
+            let revolute = q.iter_mut().zip(kinds).filter(|(_, kind)| **kind == JointKind::Revolute);
+            revolute.for_each(|(v, _)| *v *= factor);
+        });
+    }
+    add(MistakeKind::Reversed(names.clone()), &|q| q.reverse());
+    all
+}
+
+/// Shifted rows of all columns, and of some: positioner, rail or second arm stand before the first arm, or behind it, and may have been recorded
+/// apart.
+pub(in crate::identify) fn whole_and_parted(
+    robot: &Robot,
+    given: &[Vec<f64>],
+    (shifted, mistake): Undone,
+) -> Vec<Undone> {
+    let names = &robot.chain.readings;
+    let n = names.len();
+    let below = matches!(mistake, MistakeKind::Rows { below: true, .. });
+    let of_columns = (1..n).flat_map(|k| [0..k, k..n]).map(|columns| {
+        let mut changed = given.to_vec();
+        let rows = changed.iter_mut().zip(&shifted);
+        rows.for_each(|(q, of)| q[columns.clone()].copy_from_slice(&of[columns.clone()]));
+        (changed, MistakeKind::Rows { below, columns: names[columns].to_vec(), part: None })
+    });
+    let of_columns: Vec<Undone> = of_columns.collect();
+    std::iter::once((shifted, mistake)).chain(of_columns).collect()
+}
+
+/// Readings of the row below, or above.
+pub(super) fn shifted_rows(given: &[Vec<f64>]) -> [Undone; 2] {
+    [true, false].map(|below| {
+        let mut shifted = given.to_vec();
+        shifted.rotate_left(if below { 1 } else { given.len().saturating_sub(1) });
+        (shifted, MistakeKind::Rows { below, columns: Vec::new(), part: None })
+    })
+}

@@ -1,0 +1,190 @@
+//! A series as read to a series as seen: detection, readings in chain order, everything left out with its reason.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::bodies::{seen_bodies, seen_lengths};
+use super::detections::{
+    SeenSeries, Unused, detect_stops, flat_field_drift, no_images, recording, require_some, several_cameras,
+};
+use super::seen_image::SeenImage;
+use super::stated::{lens_of, measured_series, on_the_tip_beside_others};
+use crate::assess::Limits;
+use crate::detect::{Detection, set_radii};
+use crate::error::{Code, Error, Notice, Result};
+use crate::identify::controller::readings::{self, other_postures, readings_of};
+use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop, Shared};
+use crate::series::{CirclePoint, Observation, Plate, Series, Source, StopOrder};
+use crate::urdf::Chain;
+
+/// A seen series with what the user should know of it.
+#[derive(Debug, Clone)]
+pub struct MeasuredWithNotices {
+    /// The series, ready to be adjusted.
+    pub series: MeasuredSeries,
+    /// Notices of reading and detection.
+    pub notices: Vec<Notice>,
+}
+
+struct Seen {
+    observations: Shared<Vec<Observation>>,
+    left_out: Option<ImageRejection>,
+    /// What the detector advises where it found no plate.
+    remedy: Option<String>,
+}
+
+/// Reads joint values in the order of the chain and finds the plate in every image; `series` is what one camera saw. `several` series qualify the names
+/// that a single one leaves to its defaults; `limits` are those of the solve. `progress` is called after every image, from any thread.
+///
+/// # Errors
+/// Of the readings (unit, missing joints), of a series none of whose images can be used, and of differently sized images.
+pub fn measure(
+    series: &Series,
+    chain: &Chain,
+    several: bool,
+    limits: &Limits,
+    progress: impl Fn(&Path) + Sync,
+) -> Result<MeasuredWithNotices> {
+    if series.source == Source::NoImages {
+        return measure_bodies(series, chain, several);
+    }
+    let readings = readings_of(series, chain)?;
+    let bodies = seen_bodies(series, several);
+    let lengths = seen_lengths(series, several, &bodies)?;
+    let mut notices = notices_of(series, chain);
+    let camera = series.manifest.camera();
+    let lens = lens_of(series)?;
+    let mut plate = series.plate.clone();
+    let (mut seen, found_size) = match &series.source {
+        Source::Images { .. } => look_through(series, (limits, progress), &mut notices, &mut plate)?,
+        Source::Observations(all) => {
+            let by_name: BTreeMap<&str, &Vec<Observation>> =
+                all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
+            let given = |image: &str| match by_name.get(image) {
+                Some(o) => Seen { observations: (*o).clone().into(), left_out: None, remedy: None },
+                None => Seen {
+                    observations: Shared::default(),
+                    left_out: Some(ImageRejection::NoObservations),
+                    remedy: None,
+                },
+            };
+            (series.stops.stops.iter().map(|s| given(&s.image)).collect(), None)
+        }
+        Source::Recording(path) => return Err(recording(path)),
+        Source::NoImages => return Err(no_images(series)),
+        Source::Cameras(_) => return Err(several_cameras(series)),
+    };
+    let said = |s: &Seen| s.left_out.as_ref().map(|why| (why.to_string(), s.remedy.clone()));
+    let failures: Vec<Option<(String, Option<String>)>> = seen.iter().map(said).collect();
+    let stops = series.stops.stops.iter().zip(&seen).zip(&failures);
+    require_some(
+        &format!("series {}", series.name),
+        stops.map(|((stop, s), failure)| {
+            let unused = failure.as_ref().map(|(what, remedy)| Unused { what, remedy: remedy.as_deref() });
+            (stop.image.as_str(), s.observations.len(), unused)
+        }),
+    )?;
+    let (width_px, height_px) = found_size.or(camera.size_px()).ok_or_else(|| {
+        Error::new(
+            Code::SettingMissing,
+            series.manifest_file().display(),
+            "the size of the images is not known: there are observations and no images",
+            "state width_px and height_px under [camera]",
+        )
+    })?;
+    let mut stops = Vec::with_capacity(readings.len());
+    for (k, ((stop, readings), seen)) in series.stops.stops.iter().zip(readings).zip(seen.drain(..)).enumerate() {
+        let placement = placement_of(series, &stop.placement, several);
+        let Seen { observations, left_out, .. } = seen;
+        let (image, row) = (stop.image.clone(), series.row(k));
+        stops.push(MeasuredStop { row, image, readings, placement, observations, left_out });
+    }
+    // The detector measures centroids, whatever observations would mean.
+    let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
+    let measured = measured_series(series, lens, (width_px, height_px), centroid, stops);
+    let postures = other_postures(series, chain, &measured.stops);
+    Ok(MeasuredWithNotices { series: MeasuredSeries { plate, bodies, lengths, postures, ..measured }, notices })
+}
+
+/// What was measured in space alone: touches, and what a tracker saw. Images are not looked at.
+///
+/// # Errors
+/// Of the readings (unit, missing joints); distances between what was not measured.
+pub fn measure_bodies(series: &Series, chain: &Chain, several: bool) -> Result<MeasuredWithNotices> {
+    let readings = readings_of(series, chain)?;
+    let bodies = seen_bodies(series, several);
+    let lengths = seen_lengths(series, several, &bodies)?;
+    Ok(MeasuredWithNotices {
+        series: MeasuredSeries { bodies, lengths, ..without_images(series, readings) },
+        notices: notices_of(series, chain),
+    })
+}
+
+/// What reading a series gives reason to say.
+fn notices_of(series: &Series, chain: &Chain) -> Vec<Notice> {
+    let mut notices = series.notices.clone();
+    notices.extend(readings::notice(series, chain));
+    notices.extend(series.reading_notices(chain));
+    notices.extend(unused_repeatability(series));
+    notices
+}
+
+/// A series of stops at which no image was taken.
+fn without_images(series: &Series, readings: Vec<Option<Vec<f64>>>) -> MeasuredSeries {
+    let of = |(row, (stop, readings)): (usize, (&crate::series::SeriesStop, Option<Vec<f64>>))| MeasuredStop {
+        row,
+        image: stop.image.clone(),
+        readings,
+        placement: stop.placement.clone(),
+        observations: Shared::default(),
+        left_out: None,
+    };
+    let stops = series.stops.stops.iter().zip(readings).enumerate().map(of).collect();
+    MeasuredSeries::without_images(&series.name, series.manifest.robot.order == StopOrder::Visited, stops)
+}
+
+/// Name of a placement: the default one is that of its series alone, and a plate on the tip is not one in the cell.
+fn placement_of(series: &Series, placement: &str, several: bool) -> String {
+    let own = match several && placement == crate::series::DEFAULT_PLACEMENT {
+        true => format!("{placement} of {}", series.run_name()),
+        false => placement.to_owned(),
+    };
+    if on_the_tip_beside_others(series) { format!("{own} on the tip") } else { own }
+}
+
+/// What all stops show, and the size of the images.
+type SeenStops = (Vec<Seen>, Option<(u32, u32)>);
+
+/// The joint noise is estimated: what a data sheet states says nothing of what the robot model lacks, which is part of it.
+fn unused_repeatability(series: &Series) -> Option<Notice> {
+    let stated = series.manifest.robot.repeatability_m?;
+    Some(Notice::new(
+        Code::RepeatabilityUnused,
+        series.manifest_file().display(),
+        format!("robot.repeatability_m = {stated} is not used: the joint noise is estimated from the images"),
+        "give --joint-noise where it is known",
+    ))
+}
+
+/// Looks at all images; sizes of dots that the plate does not state are those seen.
+fn look_through(
+    series: &Series,
+    (limits, progress): (&Limits, impl Fn(&Path) + Sync),
+    notices: &mut Vec<Notice>,
+    plate: &mut Plate,
+) -> Result<SeenStops> {
+    let SeenSeries { images, flat_field } = detect_stops(series, limits, progress)?;
+    set_radii(plate, images.iter().map(|image| &image.detection));
+    notices.extend(images.iter().flat_map(SeenImage::notices));
+    notices.extend(flat_field.iter().flat_map(|f| flat_field_drift(series, &f.facts, limits)));
+    // The detector has refused all images of another size.
+    let usable = images.iter().filter(|i| i.detection.failure.is_none());
+    let size = usable.filter_map(|i| i.size).next().map(|(w, h)| (w as u32, h as u32));
+    let seen = |image: SeenImage| {
+        let Detection { observations, failure, .. } = image.detection;
+        let remedy = failure.as_ref().map(|error| error.remedy.clone());
+        let left_out = failure.map(|error| ImageRejection::Unusable { why: error.code, what: error.what });
+        Seen { observations: observations.into(), left_out, remedy }
+    };
+    Ok((images.into_iter().map(seen).collect(), size))
+}

@@ -1,0 +1,251 @@
+//! Identified series to a problem: who shares what, by name.
+
+use std::collections::{BTreeMap, HashMap};
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::bodies::Bodies;
+use super::local_errors::{local_share, local_terms};
+use crate::assess::Limits;
+use crate::error::{Code, Error, Result};
+use crate::geom::Pose;
+use crate::model::camera::Camera;
+use crate::model::plate_modes::DOT_GAIN;
+use crate::model::robot::{Posture, Robot};
+use crate::problem::{
+    Adjustment, DISPLACEMENT_SIZES, Family, HUBER, Image, ImageRejection, Layout, Mark, MarkerObservation,
+    MeasuredSeries, MeasuredStop, Names, Noise, PlateShape, Problem, State, Stop, Tie, intern, release_measured_scales,
+};
+use crate::series::{Edge, Observation, Plate};
+
+/// Standard deviation of an observation whose source states none, px per axis.
+const DEFAULT_SIGMA_PX: f64 = 0.1;
+
+/// First guess of the joint noise: from above, rad or m.
+pub(in crate::identify) const FIRST_JOINT_NOISE: f64 = 3e-3;
+
+/// First guess of the apparent displacement of the plate in an image: from above, rad or m.
+const FIRST_DISPLACEMENT: f64 = 1e-3;
+
+/// The problem at a state whose poses and focal lengths are still unknown (identities; pinhole of one image width).
+///
+/// With `local_errors` the errors of readings that stops have in common become columns.
+pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limits: &Limits) -> Result<Adjustment> {
+    let (mut cameras, mut mountings, mut placements, mut plate_names) = (vec![], vec![], vec![], vec![]);
+    let (mut lenses, mut plates): (Vec<Camera>, Vec<Plate>) = (vec![], vec![]);
+    let (mut stops, places) = stops_of(series);
+    let mut images: Vec<Image> = vec![];
+    for (index, s) in series.iter().enumerate().filter(|(_, s)| s.has_images) {
+        let camera = intern(&mut cameras, &s.camera);
+        if camera == lenses.len() {
+            let known = s.known_camera.as_ref().map(|k| k.camera.clone());
+            let unknown = || Camera::pinhole(s.lens, s.width_px, s.height_px, f64::from(s.width_px));
+            lenses.push(known.unwrap_or_else(unknown));
+        }
+        if (lenses[camera].width_px, lenses[camera].height_px) != (s.width_px, s.height_px) {
+            return Err(Error::new(
+                Code::SeriesDisagree,
+                format!("series {}", s.name),
+                format!(
+                    "camera '{}' has images of {}x{} px here and of {}x{} px in an earlier series",
+                    s.camera, s.width_px, s.height_px, lenses[camera].width_px, lenses[camera].height_px
+                ),
+                "give different cameras different names in [camera] of series.toml",
+            ));
+        }
+        let plate = intern(&mut plate_names, &s.plate_name);
+        if plate == plates.len() {
+            plates.push(s.plate.clone());
+        }
+        let mounting = intern(&mut mountings, &s.mounting);
+        let originals = originals(&s.stops);
+        for (row, stop) in s.stops.iter().enumerate() {
+            let observations = measured(stop, s)?;
+            let duplicate = originals[row].map(|of| ImageRejection::Duplicate { of: s.stops[of].image.clone() });
+            let rejected = stop.left_out.clone().or(duplicate).or_else(|| {
+                let found = observations.len();
+                let needed = limits.image_observations;
+                (found < needed).then_some(ImageRejection::TooFewMarkers { found, needed })
+            });
+            images.push(Image {
+                name: stop.image.clone(),
+                series: index,
+                stop: places[index][row],
+                camera,
+                mounting,
+                placement: intern(&mut placements, &stop.placement),
+                plate,
+                mount: s.mount,
+                observations: observations.into(),
+                rejected,
+            });
+        }
+    }
+    // Images of one stop follow each other.
+    images.sort_by_key(|image| image.stop);
+    let bodies = Bodies::of(series, &places);
+    let runs = stops.last().map_or(0, |s| s.series + 1);
+    let mut robot = robot.clone();
+    if local_errors {
+        robot.terms.extend(local_terms(&stops, robot.chain.readings.len(), limits.stops_in_common));
+        for stop in &mut stops {
+            stop.local_share = stop.posture.as_ref().map(|p| local_share(&robot.terms, p)).unwrap_or_default();
+        }
+    }
+    let readings = robot.chain.readings.len();
+    let state = State {
+        robot,
+        mountings: vec![Pose::identity(); mountings.len()],
+        placements: vec![Pose::identity(); placements.len()],
+        instruments: vec![Pose::identity(); bodies.instruments.len()],
+        bodies: vec![Pose::identity(); bodies.names.len()],
+        plates: plates.iter().map(PlateShape::nominal).collect(),
+        joint_errors: vec![Vec::new(); stops.len()],
+        ties: vec![Tie::Free(Pose::identity()); images.len()],
+        cameras: lenses,
+    };
+    let names = Names {
+        mountings: &mountings,
+        placements: &placements,
+        cameras: &cameras,
+        plates: &plate_names,
+        instruments: &bodies.instruments,
+        bodies: &bodies.names,
+    };
+    let mut layout = Layout::new(&state, &names);
+    release_measured_scales(&mut layout, &plates);
+    for s in series.iter().filter(|s| s.known_camera.as_ref().is_some_and(|k| k.held)) {
+        let own = cameras.iter().position(|c| *c == s.camera).map(|k| layout.cameras[k].clone());
+        own.into_iter().flatten().for_each(|c| layout.columns[c].free = false);
+    }
+    bodies.hold_unseen_turns(&mut layout);
+    for (plate, shape) in layout.shapes.clone().into_iter().enumerate() {
+        let is_circle = |o: &MarkerObservation| o.mark != Mark::Corner;
+        let own = images.iter().filter(|image| image.plate == plate);
+        layout.columns[shape.start + DOT_GAIN].free = own.flat_map(|i| i.observations.iter()).any(is_circle);
+    }
+    let noise = Noise {
+        pixel_factor: vec![1.0; cameras.len()],
+        joint: vec![vec![FIRST_JOINT_NOISE; readings]; runs],
+        local: first_local(&state, &layout),
+        displacement: Vec::new(),
+        marker: Vec::new(),
+        body: vec![[1.0; 2]; bodies.components],
+    };
+    let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
+    let mut problem = Problem {
+        layout,
+        plates,
+        placements,
+        mountings,
+        cameras,
+        stops,
+        images,
+        instruments: bodies.instruments,
+        bodies: bodies.names,
+        body_measurements: bodies.measurements,
+        lengths: bodies.lengths,
+        noise,
+        families,
+        restraint: None,
+        huber: HUBER,
+        bounds: limits.bounds(),
+    };
+    let sizes = if problem.tells_displacements().contains(&true) { DISPLACEMENT_SIZES } else { 1 };
+    problem.noise.displacement = vec![FIRST_DISPLACEMENT; runs * sizes];
+    Ok(Adjustment { problem, state })
+}
+
+/// Stops of all series, and those of the rows of each: rows of one place in a run are one stop.
+fn stops_of(series: &[MeasuredSeries]) -> (Vec<Stop>, Vec<Vec<usize>>) {
+    let (mut stops, mut places) = (Vec::new(), Vec::with_capacity(series.len()));
+    for (run, views) in series.chunk_by(|a, b| a.run.is_some() && a.run == b.run).enumerate() {
+        let rows = rows(views);
+        let mut previous: Option<&Vec<f64>> = None;
+        let first = stops.len();
+        for at in rows.values() {
+            let approach = previous.zip(at.readings.as_ref()).filter(|_| views[0].order_known);
+            let approach = approach.map(|(a, b)| b.iter().zip(a).map(|(b, a)| b - a).collect());
+            previous = at.readings.as_ref().or(previous);
+            let posture = at.readings.clone().map(|readings| Posture { readings, approach });
+            stops.push(Stop { series: run, posture, local_share: Vec::new() });
+        }
+        let place: BTreeMap<usize, usize> = rows.keys().enumerate().map(|(k, row)| (*row, first + k)).collect();
+        places.extend(views.iter().map(|s| s.stops.iter().map(|stop| place[&stop.row]).collect::<Vec<_>>()));
+    }
+    (stops, places)
+}
+
+/// A stop of every place in a run.
+fn rows(views: &[MeasuredSeries]) -> BTreeMap<usize, &MeasuredStop> {
+    let mut all = BTreeMap::new();
+    for stop in views.iter().flat_map(|s| &s.stops) {
+        all.entry(stop.row).or_insert(stop);
+    }
+    all
+}
+
+/// First guess of the local error of every reading that has columns for it; 0 for the others.
+fn first_local(state: &State, layout: &Layout) -> Vec<f64> {
+    let mut first = vec![0.0; state.robot.chain.readings.len()];
+    let terms = layout.locals.start - layout.terms.start;
+    state.robot.terms[terms..].iter().for_each(|t| first[t.reading] = FIRST_JOINT_NOISE);
+    first
+}
+
+/// Covariance uu, uv, vv of an observation as the detector states it, px^2; the usual one where it states none.
+pub fn stated_covariance(observation: &Observation) -> [f64; 3] {
+    observation.covariance.unwrap_or([DEFAULT_SIGMA_PX.powi(2), 0.0, DEFAULT_SIGMA_PX.powi(2)])
+}
+
+/// Of every image the first one before it that shows exactly the same.
+fn originals(stops: &[MeasuredStop]) -> Vec<Option<usize>> {
+    let mut before: HashMap<_, Vec<usize>> = HashMap::new();
+    let original = |(row, stop): (usize, &MeasuredStop)| {
+        let first = stop.observations.first()?;
+        let alike = before.entry((first.marker, first.uv.map(f64::to_bits))).or_default();
+        let original = alike.iter().copied().find(|&k| stops[k].observations == stop.observations);
+        alike.push(row);
+        original
+    };
+    stops.iter().enumerate().map(original).collect()
+}
+
+fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<MarkerObservation>> {
+    let mut observations = Vec::with_capacity(stop.observations.len());
+    for o in &stop.observations {
+        let place = || format!("image {}, marker {}", stop.image, o.marker);
+        let marker = s.plate.index_of(o.marker).ok_or_else(|| {
+            Error::new(
+                Code::MarkerUnknown,
+                place(),
+                "the plate has no such marker",
+                "check that plate.toml belongs to this series",
+            )
+        })?;
+        let [uu, uv, vv] = stated_covariance(o);
+        let information =
+            Matrix2::new(uu, uv, uv, vv).try_inverse().filter(|m| m[(0, 0)] > 0.0 && m.determinant() > 0.0);
+        let radius_m = match o.edge {
+            Edge::Outer => s.plate.markers[marker].outer_radius_m,
+            Edge::Inner => s.plate.markers[marker].inner_radius_m,
+        };
+        observations.push(MarkerObservation {
+            marker,
+            edge: o.edge,
+            mark: if s.centroid { Mark::of_radius(radius_m) } else { Mark::Corner },
+            uv: Vector2::from(o.uv),
+            information: information.ok_or_else(|| {
+                Error::new(
+                    Code::CsvRange,
+                    place(),
+                    "the covariance is not positive definite",
+                    "check cov_uu, cov_uv, cov_vv",
+                )
+            })?,
+            rejected: None,
+        });
+    }
+    observations.sort_by_key(|o| (o.marker, o.edge));
+    Ok(observations)
+}

@@ -1,0 +1,417 @@
+//! Hand-camera and plate poses for all mountings and placements from the free camera poses.
+
+use std::collections::BTreeMap;
+
+use super::bases;
+use crate::assess::Limits;
+use crate::diagnose::{Finding, Mistake, ReadingRatio};
+use crate::error::{Code, Error, Quantity, Result};
+use crate::fit::FreePoses;
+use crate::geom::log_so3;
+use crate::identify::bodies::rows_of::rows_of_images;
+use crate::identify::mistakes::breaks::broken;
+use crate::identify::mistakes::suspects::{Suspects, best_scale, directions_alone, left_by_scale};
+use crate::identify::start_verdict::{StartReached, StartVerdict};
+use crate::init::{
+    HandEye, HandEyeStart, PosePair, SeenStop, Zeros, hand_eye_misfit, shah, solve_hand_eye, solve_slopes, solve_zeros,
+};
+use crate::linalg::median;
+use crate::linalg::symmetric_eigen;
+use crate::model::robot::Robot;
+use crate::problem::{
+    Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
+};
+use crate::urdf::BASE_FROM_BASE;
+
+/// Closed forms whose pixel cost is compared.
+const COMPARED: usize = 4;
+
+/// What a start is judged by.
+#[derive(Clone, Copy)]
+pub(in crate::identify) struct StartGiven<'a> {
+    /// The series of the images.
+    pub series: &'a [MeasuredSeries],
+    /// All images by mounting and placement, with what they and their readings say; filled in by the start.
+    pub groups: &'a [Vec<(usize, PosePair)>],
+    /// Limits.
+    pub limits: &'a Limits,
+}
+
+/// Fills in mountings and placements; sets images aside that do not fit their readings, and returns which.
+pub(in crate::identify) fn start_robot(
+    adjustment: &mut Adjustment,
+    free: &FreePoses,
+    given: StartGiven<'_>,
+    verdicts: &mut Vec<StartVerdict>,
+) -> Result<Vec<usize>> {
+    place_bases(adjustment, free)?;
+    place_zeros(adjustment, free, given.limits);
+    let mut aside = Vec::new();
+    let robot = &adjustment.state.robot;
+    let pairs = |seen: Vec<(usize, SeenStop)>| seen.into_iter().map(|(i, stop)| (i, stop.pair(robot))).collect();
+    let mut order: Vec<(_, Vec<(usize, PosePair)>)> =
+        seen_stops(adjustment, free).into_iter().map(|(of, seen)| (of, pairs(seen))).collect();
+    order.sort_by_key(|((m, p), pairs)| (std::cmp::Reverse(pairs.len()), *m, *p));
+    let (keys, groups): (Vec<_>, Vec<_>) = order.into_iter().unzip();
+    let given = StartGiven { groups: &groups, ..given };
+    let (mut cameras, mut plates) = (BTreeMap::new(), BTreeMap::new());
+    for ((mounting, placement), pairs) in keys.iter().zip(&groups) {
+        let poses: Vec<PosePair> = pairs.iter().map(|(_, p)| *p).collect();
+        let problem = &adjustment.problem;
+        let of = format!(
+            "hand-eye transform {} and target pose {}",
+            problem.mountings[*mounting], problem.placements[*placement]
+        );
+        let known = (cameras.get(mounting).copied(), plates.get(placement).copied());
+        let is_shared = known != (None, None);
+        let solution = match known {
+            (Some(camera), Some(plate)) => HandEye { camera, plate },
+            (Some(camera), None) => {
+                closest(&poses, |p| HandEye { camera, plate: p.chain.inverse() * (camera * p.camera_from_plate) })
+            }
+            (None, Some(plate)) => {
+                closest(&poses, |p| HandEye { camera: (p.chain * plate) * p.camera_from_plate.inverse(), plate })
+            }
+            (None, None) => closed_form(adjustment, pairs, &poses, (*mounting, *placement), &of, given, verdicts)?,
+        };
+        if is_shared {
+            check_shared(adjustment, pairs, &solution, &of, given)?;
+        }
+        cameras.insert(*mounting, solution.camera);
+        plates.insert(*placement, solution.plate);
+        aside.extend(set_aside(&mut adjustment.problem, pairs, &solution, given.limits));
+    }
+    for (k, pose) in adjustment.state.mountings.iter_mut().enumerate() {
+        *pose = cameras.get(&k).copied().unwrap_or(*pose);
+    }
+    for (k, pose) in adjustment.state.placements.iter_mut().enumerate() {
+        *pose = plates.get(&k).copied().unwrap_or(*pose);
+    }
+    Ok(aside)
+}
+
+/// Images on the robot with what they and their readings say, by index, for every camera mounting and plate placement.
+fn seen_stops(adjustment: &Adjustment, free: &FreePoses) -> BTreeMap<(usize, usize), Vec<(usize, SeenStop)>> {
+    let mut groups: BTreeMap<(usize, usize), Vec<(usize, SeenStop)>> = BTreeMap::new();
+    for (i, image, _) in adjustment.used() {
+        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
+        let (readings, camera_from_plate) = (stop.readings.clone(), pose.camera_from_plate);
+        let seen = SeenStop { readings, mount: image.mount, camera_from_plate };
+        groups.entry((image.mounting, image.placement)).or_default().push((i, seen));
+    }
+    groups
+}
+
+/// Those of the mounting and placement with most of them.
+fn most_seen_stops(adjustment: &Adjustment, free: &FreePoses) -> Vec<SeenStop> {
+    let largest = seen_stops(adjustment, free).into_values().max_by_key(Vec::len).unwrap_or_default();
+    largest.into_iter().map(|(_, stop)| stop).collect()
+}
+
+/// Gives the joint between the bases of two arms an origin, where it has none yet.
+fn place_bases(adjustment: &mut Adjustment, free: &FreePoses) -> Result<()> {
+    let robot = &adjustment.state.robot;
+    let Some(joint) = bases::unplaced(robot) else { return Ok(()) };
+    let stops = most_seen_stops(adjustment, free);
+    if stops.is_empty() {
+        return Ok(());
+    }
+    let Some(placed) = bases::placed(robot, joint, &stops) else {
+        let what = "how the bases of the two arms stand to each other does not come out of these stops";
+        let remedy = "take more stops at which both arms move all their joints";
+        return Err(Error::new(Code::StopsAlike, BASE_FROM_BASE, what, remedy));
+    };
+    adjustment.state.robot = placed;
+    Ok(())
+}
+
+/// Gives joints other zeros, and one of them the other direction, where readings and images fit then and only then. A single mistake without other
+/// zeros is left to be named.
+fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
+    let robot = &adjustment.state.robot;
+    let is_found = robot.chain.joints.iter().any(|j| j.found.is_some());
+    if is_found || robot.chain.base_moves() || robot.chain.pose_coordinates().is_some() {
+        return;
+    }
+    let stops = most_seen_stops(adjustment, free);
+    if stops.len() < limits.zeros_images {
+        return;
+    }
+    let pairs: Vec<PosePair> = stops.iter().map(|stop| stop.pair(robot)).collect();
+    // The closed form of all images is enough to see that nothing is wrong.
+    let of_all = shah(&pairs).map_or(f64::INFINITY, |s| s.median_error(&pairs));
+    if of_all < limits.suspicious_misfit {
+        return;
+    }
+    let as_described = hand_eye_misfit(&pairs);
+    if as_described < limits.suspicious_misfit {
+        return;
+    }
+    // A joint that stands upside down with all behind it is the same arm with zeros half a turn off.
+    let is_plausible = |z: &Zeros| z.offsets.iter().all(|o| o.abs() < limits.zeros_most_rad);
+    let mut tried = solve_zeros(robot, &stops).into_iter().filter(is_plausible);
+    let Some(best) = tried.next() else { return };
+    let otherwise = tried.next().map_or(f64::INFINITY, |next| next.left).min(as_described);
+    let is_far = best.offsets.iter().any(|o| o.abs() > limits.zeros_off_rad);
+    let explains = best.left < limits.zeros_explain && best.left < limits.zeros_explain_share * otherwise;
+    // Zeros of parallel joints whose sum vanishes turn nothing, and look like links or a plate of another size.
+    let by_scale = || best_scale(&pairs).and_then(|scale| left_by_scale(&pairs, scale)).unwrap_or(f64::INFINITY);
+    let look_like_lengths = || {
+        best.left < limits.suspicious_misfit
+            && directions_alone(&pairs, limits).is_some()
+            && best.left < limits.zeros_explain_share * by_scale()
+    };
+    // Zeros alone are a matter of the fit as long as it starts.
+    let is_needed = best.reversed.is_some() || as_described > limits.hand_eye_spread || look_like_lengths();
+    // A reading that is wrong by a ratio looks like other zeros, as far as it stays on one side of its own.
+    let by_ratio = || {
+        let tried = solve_slopes(robot, &stops).and_then(|slopes| slopes.tried.into_iter().next());
+        tried.is_some_and(|slope| slope.left < limits.zeros_explain_share * best.left)
+    };
+    if !(is_far && explains && is_needed) || by_ratio() {
+        return;
+    }
+    let mut chain = robot.chain.clone();
+    for (reading, &offset) in best.offsets.iter().enumerate() {
+        let Some(moved) = chain.with_zero(reading, offset, best.reversed == Some(reading)) else { return };
+        chain = moved;
+    }
+    adjustment.state.robot.chain = chain;
+}
+
+/// Of the solutions that single images give, the one that all images like best.
+fn closest(poses: &[PosePair], solution: impl Fn(&PosePair) -> HandEye) -> HandEye {
+    let median = |s: &HandEye| s.median_error(poses);
+    let mut best = solution(&poses[0]);
+    let mut best_error = median(&best);
+    for s in poses[1..].iter().map(solution) {
+        let error = median(&s);
+        if error < best_error {
+            (best, best_error) = (s, error);
+        }
+    }
+    best
+}
+
+fn closed_form(
+    Adjustment { problem, state }: &Adjustment,
+    pairs: &[(usize, PosePair)],
+    poses: &[PosePair],
+    (mounting, placement): (usize, usize),
+    of: &str,
+    StartGiven { series, groups, limits }: StartGiven<'_>,
+    verdicts: &mut Vec<StartVerdict>,
+) -> Result<HandEye> {
+    let fewest = limits.hand_eye_images;
+    if pairs.len() < fewest {
+        return Err(Error::new(
+            Code::ImagesTooFew,
+            of,
+            format!(
+                "only {} images of the robot show the plate, at least {fewest} are needed and some 30 to 50 wanted",
+                pairs.len()
+            ),
+            "take more images, or give series that share camera mounting and plate placement the same names",
+        ));
+    }
+    check_rotations(of, poses, limits)?;
+    let starts = solve_hand_eye(poses);
+    let cost = |s: &HandEyeStart| {
+        let mut trial = state.clone();
+        trial.mountings[mounting] = s.solution.camera;
+        trial.placements[placement] = s.solution.plate;
+        let errors = pairs.iter().map(|(i, _)| pixels(problem, &trial, *i).unwrap_or(f64::INFINITY));
+        median(errors).unwrap_or(f64::INFINITY)
+    };
+    let mut ranked: Vec<(f64, &HandEyeStart)> = starts.iter().take(COMPARED).map(|s| (cost(s), s)).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, best)) = ranked.first() else {
+        return Err(no_fit(of, &state.robot, "no closed form has a solution"));
+    };
+    let winner = best.origin.clone();
+    for s in &starts {
+        let median_px = ranked.iter().find(|(_, r)| r.origin == s.origin).map(|(c, _)| *c).filter(|c| c.is_finite());
+        verdicts.push(StartVerdict {
+            of: of.to_owned(),
+            origin: s.origin.clone(),
+            reached: StartReached::HandEye { median_px, misfit: s.median_error },
+            won: s.origin == winner,
+        });
+    }
+    let suspects = Suspects { problem, robot: &state.robot, series, pairs, groups, limits };
+    check_fit(&suspects, best.median_error, of, "even at the best start")?;
+    Ok(best.solution)
+}
+
+/// Refuses images that share the mounting or the placement of others and do not fit there: for a mistake of theirs, or because what they
+/// share was moved.
+fn check_shared(
+    Adjustment { problem, state }: &Adjustment,
+    pairs: &[(usize, PosePair)],
+    shared: &HandEye,
+    of: &str,
+    StartGiven { series, groups, limits }: StartGiven<'_>,
+) -> Result<()> {
+    let poses: Vec<PosePair> = pairs.iter().map(|(_, pair)| *pair).collect();
+    let misfit = shared.median_error(&poses);
+    if misfit < limits.suspicious_misfit || pairs.len() < limits.hand_eye_images {
+        return Ok(());
+    }
+    let alone = hand_eye_misfit(&poses);
+    if alone < limits.suspicious_misfit && alone < limits.mistake_explains * misfit {
+        let what = format!(
+            "by themselves its {} images fit to {:.1} (mm plus mrad), with what they share with others they miss by {:.0}: camera or plate were \
+             moved between them",
+            pairs.len(),
+            1e3 * alone,
+            1e3 * misfit
+        );
+        let remedy =
+            "write another mounting under [camera] of one of the series, or another placement in its joints.csv";
+        return Err(Error::new(Code::SharedPoseDiffers, of, what, remedy));
+    }
+    let suspects = Suspects { problem, robot: &state.robot, series, pairs, groups, limits };
+    check_fit(&suspects, misfit, of, "with what is shared with other images")
+}
+
+/// Refuses what does not fit: for the mistake that explains it, or because it is too far off.
+fn check_fit(suspects: &Suspects, misfit: f64, of: &str, how: &str) -> Result<()> {
+    if let Some((kind, misfit_undone)) = suspects.better_than(misfit) {
+        let rows_of =
+            rows_of_images(suspects.problem, suspects.robot, (suspects.pairs, suspects.groups), suspects.limits);
+        let mistake = Mistake { kind, of: of.to_owned(), misfit, misfit_undone, by_images: true, rows_of };
+        return Err(Finding::from(mistake).refusal());
+    }
+    if misfit > suspects.limits.hand_eye_spread {
+        if let Some(ratio) = ReadingRatio::of_misfit(suspects.robot, &suspects.stops(), misfit, suspects.limits) {
+            return Err(Finding::from(ratio).refusal());
+        }
+        if let Some(broken) = broken(suspects, misfit, of) {
+            return Err(broken);
+        }
+        let how = format!("{how} the camera poses miss by {:.0} (median, mm plus mrad)", 1e3 * misfit);
+        return Err(suspects
+            .constant_joints()
+            .map_or_else(|| no_fit(of, suspects.robot, &how), |joints| not_moved(&joints, suspects, &how)));
+    }
+    Ok(())
+}
+
+fn no_fit(of: &str, robot: &Robot, how: &str) -> Error {
+    let (what, remedy) = match robot.chain.pose_coordinates() {
+        Some(_) => (
+            "poses of the controller",
+            "check [controller] rotation and the unit of x_m, y_m, z_m (both may be wrong), that the poses are those of the flange in the base of the robot at these images (one tool, one user frame all through), that image names stand in the right rows of controller.csv, and that the plate did not move",
+        ),
+        None => (
+            "joint readings",
+            "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows (of a recording: the clocks, see --image-delay and --clock log), that the URDF is of this robot, base and tip, and that the plate did not move",
+        ),
+    };
+    let what = format!("{what} and images do not belong together: {how}");
+    Error::new(Code::ReadingsContradict, of, what, remedy)
+}
+
+/// Refuses readings that contradict, where some joints read the same at all stops.
+fn not_moved(joints: &[String], suspects: &Suspects, what: &str) -> Error {
+    let (names, stops) = (joints.join(", "), suspects.pairs.len());
+    let what = format!(
+        "reads the same at all {stops} stops, and joint readings and images do not belong together: {what}; it may have moved without being read"
+    );
+    let remedy = format!(
+        "see whether {names} moved between the stops, and write its readings into joints.csv; if it stood still, check joint_unit, the order and signs of the joints, the rows of the images, and that the URDF is of this robot, base and tip"
+    );
+    let stops = Quantity::new("stops", stops as f64, "1");
+    Error { quantities: vec![stops], ..Error::new(Code::ReadingsContradict, names, what, remedy) }
+}
+
+/// RMS pixel error of an image at the pose that its readings predict; `None` where a marker lies behind the camera.
+fn pixels(problem: &Problem, state: &State, image: usize) -> Option<f64> {
+    let (image, posture) = (&problem.images[image], problem.posture(image)?);
+    let pose = state.camera_from_plate(image, TakenFrom::exact(posture))?;
+    let (mut sum, mut count) = (0.0, 0.0);
+    for o in image.used() {
+        sum += (o.uv - predict(image, state, &pose, o)?.uv).norm_squared();
+        count += 1.0;
+    }
+    Some((sum / f64::max(count, 1.0)).sqrt())
+}
+
+/// Hand-camera and plate pose need rotations about at least two axes.
+fn check_rotations(of: &str, poses: &[PosePair], limits: &Limits) -> Result<()> {
+    let mut m = nalgebra::DMatrix::<f64>::zeros(3, 3);
+    let (mut largest, first) = (0.0_f64, &poses[0]);
+    let (mut travel, mut seen) = (0.0_f64, 0.0_f64);
+    for p in poses {
+        let v = log_so3(&(first.chain.rotation.transpose() * p.chain.rotation));
+        let turned = first.camera_from_plate.rotation.transpose() * p.camera_from_plate.rotation;
+        seen = seen.max(log_so3(&turned).norm());
+        largest = largest.max(v.norm());
+        travel = travel.max((first.chain.translation - p.chain.translation).norm());
+        m += nalgebra::DMatrix::from_column_slice(3, 3, (v * v.transpose()).as_slice()) / poses.len() as f64;
+    }
+    let second = symmetric_eigen(&m).map_or(0.0, |(values, _)| values[1].max(0.0).sqrt());
+    if second > limits.hand_eye_rotation_rad {
+        return Ok(());
+    }
+    if seen > limits.hand_eye_rotation_rad && largest < limits.mistake_explains * seen {
+        let what = format!(
+            "the camera turned by {:.0} degrees between the images, the hand by {:.1} degrees by its readings: these are radians, read as degrees, or were not read anew at every stop",
+            seen.to_degrees(),
+            largest.to_degrees()
+        );
+        let remedy = "write joint_unit = \"rad\" in series.toml (of a recording: in the .toml of its name); in controller.csv convert the angles, or state the rotation in radians";
+        return Err(Error::new(Code::JointUnitWrong, of, what, remedy));
+    }
+    Err(Error::new(
+        Code::StopsAlike,
+        of,
+        format!(
+            "the stops are too much alike: the hand turned by at most {:.1} degrees, about a second axis by {:.1} degrees only",
+            largest.to_degrees(),
+            second.to_degrees()
+        ),
+        "move the wrist: tilt the camera by 20 to 45 degrees to all sides and roll it between the images",
+    ))
+}
+
+fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye, limits: &Limits) -> Vec<usize> {
+    let mut aside = Vec::new();
+    let misfits: Vec<f64> = pairs.iter().map(|(_, p)| solution.misfit(p)).collect();
+    let bound = (limits.set_aside_factor * median(misfits).unwrap_or(f64::INFINITY)).max(limits.set_aside_floor);
+    for (i, pair) in pairs {
+        if solution.misfit(pair) > bound {
+            let (angle_rad, distance_m) = solution.error(pair);
+            problem.images[*i].rejected =
+                Some(ImageRejection::WronglyPaired(Mismatch::HandEye(Misfit { distance_m, angle_rad })));
+            aside.push(*i);
+        }
+    }
+    aside
+}
+
+/// How far the stand-alone camera pose of an image is from that of its readings, rad + m.
+fn misfit(adjustment: &Adjustment, free: &FreePoses, image: usize) -> Option<f64> {
+    Some(adjustment.camera_by_readings(image)?.misfit(&free.poses[image].as_ref()?.camera_from_plate))
+}
+
+/// Median of these of the images in use.
+pub(in crate::identify) fn usual_misfit(adjustment: &Adjustment, free: &FreePoses) -> Option<f64> {
+    let of_used = adjustment.problem.used_on_robot().filter_map(|i| misfit(adjustment, free, i));
+    median(of_used)
+}
+
+/// Takes images back that were set `aside` with the nominal robot, and fit the robot that was found as the others do. True where there are some.
+pub(in crate::identify) fn take_back(
+    adjustment: &mut Adjustment,
+    free: &FreePoses,
+    aside: &[usize],
+    limits: &Limits,
+) -> bool {
+    let Some(usual) = usual_misfit(adjustment, free) else { return false };
+    let fits = |i: &usize| misfit(adjustment, free, *i).is_some_and(|s| s < limits.set_aside_factor * usual);
+    let is_out = |i: &usize| adjustment.problem.images[*i].rejected.is_some();
+    let back: Vec<usize> = aside.iter().copied().filter(|i| is_out(i) && fits(i)).collect();
+    back.iter().for_each(|&i| adjustment.problem.images[i].rejected = None);
+    !back.is_empty()
+}

@@ -1,0 +1,184 @@
+//! Boards that look the same after a turn: which way round they were in each image, from the readings of the robot.
+//!
+//! Two images of one camera mounting and one placement see the plate at M_i = X^-1 A_i Z (X, Z unknown, A from the readings), so that
+//! M_i M_j^-1 turns by the same angle as A_i A_j^-1, whatever X and Z are. An image whose ids are off by a turn T of the plate shows M_i T,
+//! and the angle does not fit. What is left open is one turn of all images together: a choice of the plate's frame.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::assess::Limits;
+use crate::geom::{exp_so3, log_so3};
+use crate::identify::photogrammetry::free_poses::free_poses_of;
+use crate::init::{PosePair, solve_hand_eye};
+use crate::model::robot::Robot;
+use crate::problem::MeasuredSeries;
+use crate::series::PlateTurn;
+
+/// Angles further apart do not count more, rad: such an image has another fault.
+const MOST_MISFIT: f64 = 0.3;
+/// Most rounds in which every image is compared with all others.
+const ROUNDS: usize = 10;
+
+/// An image on the robot.
+struct View {
+    series: usize,
+    stop: usize,
+    /// `camera_from_plate` for every turn that the plate allows, by quarter turns.
+    camera_from_plate: Vec<(u8, Matrix3<f64>)>,
+    /// M as the ids are, and A.
+    pair: PosePair,
+}
+
+/// The series with ids as the readings demand them; unchanged where the plates have no symmetry or no camera poses are found.
+pub(in crate::identify) fn settled<'a>(
+    robot: &Robot,
+    series: &'a [MeasuredSeries],
+    limits: &Limits,
+) -> Cow<'a, [MeasuredSeries]> {
+    let turns: Vec<Vec<PlateTurn>> = series.iter().map(|s| s.plate.turns()).collect();
+    if turns.iter().all(Vec::is_empty) {
+        return Cow::Borrowed(series);
+    }
+    let mut turned = series.to_vec();
+    let mut changed = false;
+    let mut found: BTreeMap<usize, Matrix3<f64>> = BTreeMap::new();
+    for (placement, views) in groups(robot, series, &turns, limits) {
+        let own = agreeing(&views);
+        let common = common_turn(&views, &own, &turns[views[0].series], found.get(&placement));
+        if let Some(plate) = plate_of(&views, &own, common) {
+            found.entry(placement).or_insert(plate);
+        }
+        for (view, own) in views.iter().zip(own) {
+            let quarters = (own + common) % 4;
+            let turn = turns[view.series].iter().find(|t| t.quarters == quarters);
+            let Some(turn) = turn else { continue };
+            let observations = &mut turned[view.series].stops[view.stop].observations;
+            observations.iter_mut().for_each(|o| o.marker = turn.id(o.marker));
+            observations.sort_by_key(|o| (o.marker, o.edge));
+            changed = true;
+        }
+    }
+    if changed { Cow::Owned(turned) } else { Cow::Borrowed(series) }
+}
+
+/// Images that share a camera mounting and a placement, with the index of this and the poses that the images alone give; the largest first.
+fn groups(
+    robot: &Robot,
+    series: &[MeasuredSeries],
+    turns: &[Vec<PlateTurn>],
+    limits: &Limits,
+) -> Vec<(usize, Vec<View>)> {
+    let Ok((adjustment, free, _)) = free_poses_of(robot, series, limits, |_| Ok(())) else { return Vec::new() };
+    let mut groups: BTreeMap<(usize, usize), Vec<View>> = BTreeMap::new();
+    let place = |i: usize| {
+        let images = &adjustment.problem.images;
+        images[..i].iter().filter(|other| other.series == images[i].series).count()
+    };
+    for (i, image, _) in adjustment.used() {
+        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
+        let pair = PosePair::of_stop(robot, image.mount, &stop.readings, pose.camera_from_plate);
+        let seen = pair.camera_from_plate.rotation;
+        let tried = std::iter::once(0).chain(turns[image.series].iter().map(|t| t.quarters));
+        let camera_from_plate = tried.map(|quarters| (quarters, seen * about(quarters)));
+        groups.entry((image.mounting, image.placement)).or_default().push(View {
+            series: image.series,
+            stop: place(i),
+            camera_from_plate: camera_from_plate.collect(),
+            pair,
+        });
+    }
+    let of_placement = |((_, placement), views)| (placement, views);
+    let mut all: Vec<(usize, Vec<View>)> = groups.into_iter().map(of_placement).collect();
+    all.retain(|(_, views)| views.iter().any(|v| v.camera_from_plate.len() > 1));
+    all.sort_by_key(|(_, views)| std::cmp::Reverse(views.len()));
+    all
+}
+
+/// Rotation of the plate in what holds it, from images that are turned by their `own` quarters and a common one.
+fn plate_of(views: &[View], own: &[u8], common: u8) -> Option<Matrix3<f64>> {
+    let turned = |(view, own): (&View, &u8)| {
+        let mut pair = view.pair;
+        pair.camera_from_plate.rotation *= about(own + common);
+        pair
+    };
+    let pairs: Vec<PosePair> = views.iter().zip(own).map(turned).collect();
+    solve_hand_eye(&pairs).first().map(|s| s.solution.plate.rotation)
+}
+
+/// The turn of all images with which another camera sees the plate the way round that the first one does.
+fn common_turn(views: &[View], own: &[u8], turns: &[PlateTurn], known: Option<&Matrix3<f64>>) -> u8 {
+    let (Some(known), Some(plate)) = (known, plate_of(views, own, 0)) else { return 0 };
+    let off = |quarters: &u8| log_so3(&(known.transpose() * plate * about(*quarters))).norm();
+    let allowed = std::iter::once(0).chain(turns.iter().map(|t| t.quarters));
+    allowed.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
+}
+
+/// The rotation of the plate frame that quarter turns of its ids are.
+fn about(quarters: u8) -> Matrix3<f64> {
+    exp_so3(&Vector3::new(0.0, 0.0, -f64::from(quarters) * std::f64::consts::FRAC_PI_2))
+}
+
+/// The turns, by quarters, with which the images agree best; that of most images is none.
+fn agreeing(views: &[View]) -> Vec<u8> {
+    let angle = |a: &Matrix3<f64>, b: &Matrix3<f64>| log_so3(&(a * b.transpose())).norm();
+    let mut chosen: Vec<Option<usize>> = vec![None; views.len()];
+    for round in 0..ROUNDS {
+        let before = chosen.clone();
+        for i in 0..views.len() {
+            let misfit = |k: usize| -> f64 {
+                let pairs = chosen.iter().enumerate().filter(|(j, _)| *j != i).filter_map(|(j, &c)| Some((j, c?)));
+                pairs
+                    .map(|(j, c)| {
+                        let seen = angle(&views[i].camera_from_plate[k].1, &views[j].camera_from_plate[c].1);
+                        (seen - angle(&views[i].pair.chain.rotation, &views[j].pair.chain.rotation))
+                            .abs()
+                            .min(MOST_MISFIT)
+                    })
+                    .sum()
+            };
+            let misfits: Vec<f64> = (0..views[i].camera_from_plate.len()).map(misfit).collect();
+            chosen[i] = (0..misfits.len()).min_by(|&a, &b| misfits[a].total_cmp(&misfits[b]));
+        }
+        if round > 0 && chosen == before {
+            break;
+        }
+    }
+    let quarters: Vec<u8> = views.iter().zip(&chosen).map(|(v, c)| v.camera_from_plate[c.unwrap_or(0)].0).collect();
+    let count = |q: u8| quarters.iter().filter(|&&other| other == q).count();
+    let usual = (0..4).max_by_key(|&q| (count(q), std::cmp::Reverse(q))).unwrap_or(0);
+    quarters.iter().map(|q| (q + 4 - usual) % 4).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Pose;
+
+    /// Images of a camera in the hand at eight postures, seen with ids that are off by these quarter turns.
+    fn views(off: &[u8], allowed: &[u8]) -> Vec<View> {
+        let rotation = |k: usize| {
+            let angles = [0.9, 0.7, 1.3].map(|f: f64| (f * (k as f64 + 1.0) * 2.3).sin() * 1.4);
+            exp_so3(&Vector3::from(angles))
+        };
+        let (x, z) = (rotation(40), rotation(50));
+        let view = |(k, &off): (usize, &u8)| {
+            let seen = x.transpose() * rotation(k) * z * about(4 - off);
+            let tried = std::iter::once(&0).chain(allowed);
+            let camera_from_plate = tried.map(|&q| (q, seen * about(q))).collect();
+            let [chain, seen] = [rotation(k), seen].map(|r| Pose::new(r, Vector3::zeros()));
+            View { series: 0, stop: k, camera_from_plate, pair: PosePair { camera_from_plate: seen, chain } }
+        };
+        off.iter().enumerate().map(view).collect()
+    }
+
+    #[test]
+    fn turned_images_are_turned_back() {
+        let half = [0, 0, 2, 0, 2, 0, 0, 2];
+        assert_eq!(agreeing(&views(&half, &[2])), half);
+        let quarter = [0, 1, 0, 3, 0, 2, 0, 0];
+        assert_eq!(agreeing(&views(&quarter, &[1, 2, 3])), quarter);
+    }
+}
