@@ -122,11 +122,7 @@ pub const CHECKS: &[Check] = &[
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
     check("stated_noise", Stage::Fit(|a, b, s| found(stated_noise::check(a, b, s)))),
     Check {
-        explains: |own, other| match (own, other) {
-            (Finding::ImagesShifted(own), Finding::FocusChange(focus)) => own.explains_focus(focus),
-            (_, Finding::NoiseContradicted(noise)) => noise.is_explained_by(Weight::Gate),
-            _ => false,
-        },
+        explains: |_, other| matches!(other, Finding::NoiseContradicted(noise) if noise.is_explained_by(Weight::Gate)),
         ..check("loose", Stage::Fit(loose::check))
     },
     check("moved", Stage::LeftOut(|a, s| found(moved::check(a, s)))),

@@ -113,7 +113,7 @@ pub fn is_whole(path: &Path) -> Result<bool> {
     if !start.starts_with(&jpeg::START) || (length > TAIL && has(&end, &jpeg::END)) {
         return Ok(true);
     }
-    jpeg::is_complete(&mut Cursor::new(read(path, FileKind::Image)?)).map_err(io)
+    Ok(jpeg::lacking(&mut Cursor::new(read(path, FileKind::Image)?)).map_err(io)?.is_none())
 }
 
 /// How many pages a TIFF file has, and which of them is read, from 1 on; `None` for other files and where there is one.

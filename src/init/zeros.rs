@@ -82,6 +82,9 @@ const ORIGIN: [f64; 2] = [1e-3, 2e-3];
 const FAR: f64 = 6.0;
 const ROUNDS: usize = 30;
 
+/// Relative error that all camera poses may have in common: scale of the plate and of the image.
+const COMMON: f64 = 1e-4;
+
 /// Stops that tell the slope of a reading well enough.
 const MOST_STOPS: usize = 200;
 
@@ -229,7 +232,7 @@ impl Trial<'_> {
             x = x.moved(&step.rows(0, first).into_owned());
             let twists = robot.twists.iter_mut().enumerate();
             twists.for_each(|(k, xi)| *xi += step.fixed_rows::<6>(first + 6 * k));
-            told = Some((x.part, inverse[(first - 1, first - 1)].sqrt()));
+            told = Some((x.part, inverse[(first - 1, first - 1)].sqrt().hypot(COMMON)));
         }
         told
     }

@@ -46,6 +46,33 @@ fn every_format_keeps_its_depth() {
     }
 }
 
+/// A chessboard of 24 x 24 px in six scans, two hexadecimal digits a byte.
+const PROGRESSIVE: &str = "\
+    ffd8ffe000104a46494600010100000100010000ffdb0043000d090a0b0a080d0b0a0b0e0e0d0f13201513121213271c1e17202e293130\
+    2e292d2c333a4a3e333646372c2d405741464c4e525352323e5a615a50604a51524fffc2000b080018001801011100ffc4001600010101\
+    00000000000000000000000000030004ffda0008010100000001cccc34c23fffc4001b1001000203010100000000000000000000030002\
+    0413142434ffda000801010001050222b8a647a612d04f7f4cf8a68e98a5413c7f4c55b8a7ffc4001f1000010304030100000000000000\
+    000000010003120211133122415281ffda0008010100063f020e382d48d954e1e51da0db86d50d85863197775ee7f1669465d59171b16a\
+    868aab3728e916db36a4682fffc400211000010303040300000000000000000000210001114161715181c1d131f0f1ffda000801010001\
+    3f2133be467b516e26889ce119df03bde8bb00883c2f47847d5d80440e109df23bdaab613444e3084ef819ef55ffda0008010100000010\
+    ff00ff00ffc4001d1001000105010101000000000000000000011100314151f021b1d1ffda0008010100013f10d75f09223c4b74ae5d84\
+    61375b55ae3e12547a12c95dbd308270be6bb7eb99f8aede9949395b35ae3e12517892cb5cbb19c26cbeab5d7c2482f42dd6bfffd9\
+";
+
+/// A copy that was cut short is decoded without its finest structure.
+#[test]
+fn a_progressive_jpeg_without_its_last_scans_is_refused() {
+    let digits: Vec<char> = PROGRESSIVE.chars().collect();
+    let byte = |two: &[char]| u8::from_str_radix(&two.iter().collect::<String>(), 16).unwrap();
+    let whole: Vec<u8> = digits.chunks(2).map(byte).collect();
+    let loaded = |bytes: &[u8]| load_bytes("cut.jpg".as_ref(), bytes, None);
+    let picture = loaded(&whole).unwrap();
+    assert!(picture.at(2, 2) < 60.0 && picture.at(8, 2) > 180.0);
+    for length in [whole.len() - 2, 400, 300] {
+        assert_eq!(loaded(&whole[..length]).unwrap_err().code, Code::ImageTruncated, "{length}");
+    }
+}
+
 /// A copy that was cut short is decoded with its lower half grey.
 #[test]
 fn a_jpeg_that_ends_early_is_refused_and_one_without_a_mark_of_the_end_is_not() {

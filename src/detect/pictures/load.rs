@@ -7,7 +7,8 @@ use image::{DynamicImage, ImageError};
 
 use crate::detect::Picture;
 use crate::error::{Code, Error, Result};
-use crate::files::{self, FileKind, MOST_SIDE_PX, decode_picture, jpeg};
+use crate::files::jpeg::{self, Lacking};
+use crate::files::{self, FileKind, MOST_SIDE_PX, decode_picture};
 
 /// Weights of red, green and blue in the grey value (luma of ITU-R BT.709), applied to the stored counts.
 const LUMA_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
@@ -44,8 +45,12 @@ fn load_from(path: &Path, source: impl BufRead + Seek, bits: Option<u32>) -> Res
     let mut source = source;
     let decoded = decode_picture(&mut source).map_err(|e| decode_error(path, &e))?;
     let picture = to_picture(&decoded);
-    if ends_in_one_value(&picture) && !jpeg::is_complete(&mut source).unwrap_or(true) {
-        let what = "the file ends before the lowest rows of the image";
+    let lacking = match jpeg::lacking(&mut source).unwrap_or_default() {
+        Some(Lacking::Rows) if ends_in_one_value(&picture) => Some("the file ends before the lowest rows of the image"),
+        Some(Lacking::Scans) => Some("the file ends before the last scan of the image, which is blurred without it"),
+        Some(Lacking::Rows) | None => None,
+    };
+    if let Some(what) = lacking {
         return Err(Error::new(Code::ImageTruncated, path.display(), what, "copy or record the image again"));
     }
     if picture.width < 2 || picture.height < 2 {

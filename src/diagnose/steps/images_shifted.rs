@@ -1,15 +1,11 @@
-//! The finding that some pictures of a camera are cut out elsewhere than the others; [`super::pose_step`] and [`super::loose`] look for it.
+//! The finding that pictures of a camera are cut out elsewhere from one on; [`super::pose_step`] looks for it.
 
-use super::candidates::Order;
 use super::displaced::Displaced;
 use super::rows::Step;
 use crate::diagnose::focus::FocusChange;
-use crate::diagnose::kind::{Kind, Quantity, Subject, Weight, some_of};
+use crate::diagnose::kind::{Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::problem::Problem;
-
-/// Most images that are named.
-const MOST_IMAGES: usize = 5;
 
 /// Pictures whose content is shifted against that of the others of their camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,10 +14,8 @@ pub struct ImagesShifted {
     pub camera: String,
     /// Names of its mountings in these images.
     pub mountings: Vec<String>,
-    /// The images, in their order.
+    /// The images, in their order: all from the first on.
     pub images: Vec<String>,
-    /// Whether others stand between them; else all from the first on are shifted.
-    pub by_turns: bool,
     /// By how much to the right and downwards, px: at least, as the fit has taken a part of it.
     pub shift_px: [f64; 2],
     /// Gate, or a note where it explains little of the joint noise.
@@ -39,7 +33,6 @@ impl ImagesShifted {
             camera: problem.cameras[camera].clone(),
             mountings,
             images,
-            by_turns: step.order == Order::Turns,
             shift_px: [0, 1].map(|axis| step.change[axis]),
             weight: if step.explains_most { Weight::Gate } else { Weight::Note },
         }
@@ -87,12 +80,8 @@ impl Kind for ImagesShifted {
     fn seen(&self) -> String {
         let [u, v] = self.shift_px;
         let first = self.images.first().map_or("", String::as_str);
-        let which = match self.by_turns {
-            true => format!("{} of its images ({})", self.images.len(), some_of(&self.images, MOST_IMAGES)),
-            false => format!("its images from {first} on"),
-        };
         format!(
-            "{which} are shifted against the others, by {u:+.1} px in u and {v:+.1} px in v or more: the region that is read from the sensor, or the crop, was changed"
+            "its images from {first} on are shifted against the others, by {u:+.1} px in u and {v:+.1} px in v or more: the region that is read from the sensor, or the crop, was changed"
         )
     }
 

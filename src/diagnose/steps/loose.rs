@@ -1,11 +1,10 @@
 //! A camera that sits loosely on its mount: it tips over between two positions, and the joint noise shows two heaps. So it does where the plate has
-//! two places by turns, or the pictures: what stands out most clearly from the spread of its heaps is named.
+//! two places by turns: what stands out most clearly from the spread of its heaps is named.
 
 use nalgebra::Vector6;
 
 use super::candidates::Changed;
 use super::displaced::{Carried, Displaced, Displacement};
-use super::images_shifted::ImagesShifted;
 use super::loose_mounting::LooseMounting;
 use super::rows::{Linear, Step};
 use crate::assess::{Accuracy, Limits};
@@ -78,16 +77,10 @@ fn of_mounting(fit: &Fit, mounting: usize, setting: &CheckContext) -> Option<Fin
         let step = as_plate(fit, (placement, mounting), &two)?;
         Some((placement, two, step))
     });
-    let (changed, two) = match (&plate, &camera) {
-        (Some((placement, two, _)), _) => (Changed::Placement(*placement), two),
-        (None, Some(two)) => (Changed::Mounting(mounting), two),
-        (None, None) => return None,
-    };
-    let shifted = shifted(fit, changed, two).map(Finding::from);
-    shifted.or_else(|| match plate {
+    match plate {
         Some((_, two, step)) => Some(two.displaced(fit, &step, mounting, setting).into()),
         None => camera.map(|two| two.loose_mounting(fit, mounting).into()),
-    })
+    }
 }
 
 /// A plate that stands elsewhere in these images, where that explains more than a camera that does.
@@ -97,20 +90,6 @@ fn as_plate(fit: &Fit, (placement, mounting): (usize, usize), two: &TwoPlaces) -
     let plate = step(Changed::Placement(placement))?;
     let camera = step(Changed::Mounting(mounting));
     camera.is_none_or(|camera| camera.fall < plate.fall).then_some(plate)
-}
-
-/// The shift of the pictures, where it explains more than that body.
-fn shifted(fit: &Fit, changed: Changed, two: &TwoPlaces) -> Option<ImagesShifted> {
-    if two.changes < CHANGES {
-        return None;
-    }
-    let (problem, linear) = (&fit.problem, Linear::of(fit.linear()));
-    let moved = linear.most(problem, &[linear.at(problem, changed, &two.smaller)?])?;
-    let mut step = linear.seen_otherwise(problem, &moved, two.smaller.len())?;
-    tracing::debug!(?changed, moved = moved.fall, change = ?step.change, "pictures by turns");
-    step.explains_most = true;
-    let Changed::Centre(camera) = step.changed else { return None };
-    Some(ImagesShifted::of(&step, problem, camera, two.names(fit)))
 }
 
 /// By how much a body seems to be elsewhere in each of some images, by their index.

@@ -85,8 +85,7 @@ impl Linear {
             Order::Time => [Changed::Focal(camera), Changed::Centre(camera)].map(once).concat(),
             // What moved once by much may creep, too, as far as one step from the fit tells.
             Order::Drift => once(Changed::Centre(camera)),
-            Order::Turns => self.at(problem, Changed::Centre(camera), &moved.images()).into_iter().collect(),
-            Order::Up(_) | Order::Whole => return None,
+            Order::Up(_) | Order::Whole | Order::Turns => return None,
         };
         let mut step = self.most(problem, &tried)?;
         let by_chance = step.change.len() as f64;
