@@ -1,15 +1,26 @@
-//! The plates of a solution in the frames that their nominal markers define: covariances and scales, made once for all files.
+//! The plates of a solution in the frames that their nominal markers define: shapes, poses, covariances and scales, made once for all files.
+//!
+//! The priors of modes and corrections hold a fitted plate in a frame of their own: the mean of a bow, or the turn of a skew, is left in it.
+//! All that is written of plates goes through here, so that what one file states fits what another one does.
 
 use nalgebra::{Matrix3, Matrix6};
 
 use crate::error::Result;
 use crate::fit::Fit;
-use crate::problem::{Adjustment, Problem};
+use crate::geom::{Pose, adjoint};
+use crate::problem::{Adjustment, PlateShape, Problem};
 use crate::solve::{InFrame, PlateScale, Similarity, in_frame};
 
-/// Covariances of placements and markers in the frames of the plates.
+/// Plates, their poses and covariances in the frames of their nominal markers.
 pub(super) struct Gauge {
     in_frame: InFrame,
+    /// Shapes of the plates, as large as they were found; that of a plate that no image shows as it was.
+    pub plates: Vec<PlateShape>,
+    /// Poses of the plates: `base_from_plate`, or `flange_from_plate` for a fixed camera.
+    pub placements: Vec<Pose>,
+    /// `fitted plate frame <- frame` of every plate and of every placement.
+    of_plates: Vec<Pose>,
+    of_placements: Vec<Pose>,
     /// Covariance of the position of every marker, its plate's scale apart, m^2.
     pub positions: Vec<Vec<Matrix3<f64>>>,
     /// Scale of every plate as in its files; none for a plate that no image shows.
@@ -24,19 +35,52 @@ impl Gauge {
     pub fn of(fit: &Fit) -> Result<Self> {
         let Adjustment { problem, state } = &fit.adjustment;
         let in_frame = in_frame(fit.linear(), &fit.covariance)?;
-        let scale = |plate: usize| -> Result<Option<PlateScale>> {
-            let Some((frame, sigma)) = in_frame.frame(plate).zip(in_frame.scale_sigma(problem, plate)) else {
-                return Ok(None);
-            };
-            let similarity = Similarity::of(problem, &frame.seen, plate, &state.plates[plate])?;
-            Ok(Some(PlateScale { relative: similarity.size - 1.0, sigma }))
-        };
-        let scales = (0..problem.plates.len()).map(scale).collect::<Result<_>>()?;
-        Ok(Self { positions: in_frame.positions(fit), scales, in_frame })
+        let mut plates = state.plates.clone();
+        let mut of_plates = vec![Pose::identity(); plates.len()];
+        let mut scales = vec![None; plates.len()];
+        for frame in &in_frame.frames {
+            let similarity = Similarity::of(frame, &fit.adjustment)?;
+            for &plate in &frame.plates {
+                let size = similarity.size(plate);
+                plates[plate] = similarity.shape(plate, &state.plates[plate], size);
+                of_plates[plate] = similarity.motion;
+                let sigma = in_frame.scale_sigma(problem, plate);
+                scales[plate] = sigma.map(|sigma| PlateScale { relative: size - 1.0, sigma });
+            }
+        }
+        let of_placements: Vec<Pose> =
+            plates_of_placements(fit).into_iter().map(|p| p.map_or_else(Pose::identity, |p| of_plates[p])).collect();
+        let placements = state.placements.iter().zip(&of_placements).map(|(pose, motion)| *pose * *motion).collect();
+        let mut positions = in_frame.positions(fit);
+        for (own, motion) in positions.iter_mut().zip(&of_plates) {
+            let turn = motion.rotation.transpose();
+            own.iter_mut().for_each(|c| *c = turn * *c * turn.transpose());
+        }
+        Ok(Self { in_frame, plates, placements, of_plates, of_placements, positions, scales })
     }
 
     /// Covariance of the pose of a plate.
     pub fn placement(&self, problem: &Problem, placement: usize) -> Matrix6<f64> {
-        self.in_frame.placement(problem.layout.placements[placement].start)
+        let covariance = self.in_frame.placement(problem.layout.placements[placement].start);
+        // The body twist of `T M` is `Ad(M^-1)` times that of `T`.
+        let followed = adjoint(&self.of_placements[placement].inverse());
+        followed * covariance * followed.transpose()
     }
+
+    /// `camera_from_plate` of an image, of which the fit has this pose.
+    pub fn camera_from_plate(&self, Adjustment { problem, state }: &Adjustment, image: usize, fitted: &Pose) -> Pose {
+        let own = &problem.images[image];
+        let is_free = own.rejected.is_none() && state.ties[image].is_free();
+        *fitted * if is_free { self.of_plates[own.plate] } else { self.of_placements[own.placement] }
+    }
+}
+
+/// The plate of every placement: that of the images that tie it to the robot, else that of the first image.
+fn plates_of_placements(Adjustment { problem, state }: &Adjustment) -> Vec<Option<usize>> {
+    let mut plates = vec![None; problem.placements.len()];
+    let tied = problem.used().filter(|(k, _)| !state.ties[*k].is_free()).map(|(_, image)| image);
+    for image in tied.chain(&problem.images) {
+        plates[image.placement].get_or_insert(image.plate);
+    }
+    plates
 }

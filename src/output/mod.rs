@@ -99,7 +99,7 @@ pub fn each_file(
     let texts = (camera_file::cameras(&problem.cameras, &state.cameras, &depths).into_iter())
         .chain(pose_files::mountings(solution))
         .chain(pose_files::placements(solution, &gauge))
-        .chain(plate_files::plates(&solution.fit, &context.series, &gauge)?);
+        .chain(plate_files::plates(problem, &context.series, &gauge)?);
     texts.into_iter().try_for_each(|(name, text)| add(name, text.into_bytes()))?;
     let mut together = None;
     if context.poses == Poses::Written {

@@ -8,9 +8,10 @@ use crate::outputs_support::truth_frame::{
 };
 use crate::outputs_support::{context, robot, series, series_with_bar_in_two_places};
 use crate::robots::made_with;
+use crate::whole::positions;
 use nalgebra::{DMatrix, Matrix6, Vector3};
 use rayon::prelude::*;
-use robotcal::geom::{Pose, adjoint, skew};
+use robotcal::geom::{Pose, adjoint, rigid_fit, skew};
 use robotcal::identify::{JointNoise, Options, RobotModel, Solution, identify};
 use robotcal::model::camera::MAX_PARAMETERS;
 use robotcal::model::plate_modes::{MODES, basis};
@@ -196,7 +197,12 @@ fn check(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
         several => several.iter().map(|p| format!("plate_pose.{p}.yaml")).collect(),
     };
     let starts = problem.layout.placements.iter().map(|c| c.start);
-    let plates = names.iter().zip(starts).map(|(name, start)| relative(&read(name), &joint.placement(start)));
+    // The pose that is written is that of the frame: the body twist of `T M` is `Ad(M^-1)` times that of `T`.
+    let moved: Vec<_> =
+        positions(files).into_iter().enumerate().map(|(k, x)| (state.plates[0].position(k), x)).collect();
+    let followed = adjoint(&rigid_fit(&moved).unwrap());
+    let expected = |start: usize| followed * joint.placement(start) * followed.transpose();
+    let plates = names.iter().zip(starts).map(|(name, start)| relative(&read(name), &expected(start)));
     let plate = plates.fold(0.0, f64::max);
     let of_camera = Matrix6::from_column_slice(joint.of(&joint.six(camera_start)).as_slice());
     let camera = relative(&read("hand_camera.yaml"), &of_camera);

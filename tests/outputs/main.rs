@@ -13,6 +13,7 @@ mod support;
 
 mod controller;
 mod gauge;
+mod plate_frame;
 mod poses;
 mod report;
 mod verify_points;

@@ -29,7 +29,7 @@ fn shipped() -> Vec<MeasuredSeries> {
     series
 }
 
-fn of_poses(series: &str) -> StandAloneContext {
+pub(super) fn of_poses(series: &str) -> StandAloneContext {
     StandAloneContext {
         series: vec![series.to_owned()],
         inputs: Vec::new(),

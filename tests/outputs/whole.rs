@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::outputs_support::{context, robot, solved};
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector3};
 use robotcal::geom::Pose;
 use robotcal::identify::RobotModel;
 use robotcal::model::joint_terms::Term;
@@ -15,19 +15,19 @@ use robotcal::series::{CameraMount, read_plate};
 use serde::Deserialize;
 use serde_json::Value;
 
-type Files = BTreeMap<String, Vec<u8>>;
+pub(super) type Files = BTreeMap<String, Vec<u8>>;
 
-fn text<'a>(files: &'a Files, name: &str) -> &'a str {
+pub(super) fn text<'a>(files: &'a Files, name: &str) -> &'a str {
     let bytes = files.get(name).unwrap_or_else(|| panic!("no {name} among {:?}", files.keys()));
     std::str::from_utf8(bytes).unwrap()
 }
 
-fn rows(files: &Files, name: &str) -> Vec<BTreeMap<String, String>> {
+pub(super) fn rows(files: &Files, name: &str) -> Vec<BTreeMap<String, String>> {
     csv::Reader::from_reader(text(files, name).as_bytes()).deserialize().map(|r| r.unwrap()).collect()
 }
 
 #[derive(Debug, Deserialize)]
-struct PoseYaml {
+pub(super) struct PoseYaml {
     parent: String,
     child: String,
     xyz_m: [f64; 3],
@@ -37,11 +37,11 @@ struct PoseYaml {
 }
 
 impl PoseYaml {
-    fn read(files: &Files, name: &str) -> Self {
+    pub(super) fn read(files: &Files, name: &str) -> Self {
         serde_saphyr::from_str(text(files, name)).unwrap()
     }
 
-    fn pose(&self) -> Pose {
+    pub(super) fn pose(&self) -> Pose {
         Pose::from_xyz_quaternion(self.xyz_m, self.quat_xyzw)
     }
 }
@@ -59,7 +59,7 @@ fn chain_of(urdf: &str) -> robotcal::urdf::Chain {
     description.chain(None, None).unwrap()
 }
 
-fn reread_chain(files: &Files) -> robotcal::urdf::Chain {
+pub(super) fn reread_chain(files: &Files) -> robotcal::urdf::Chain {
     chain_of(text(files, "kuka_kr6_r900.calibrated.urdf"))
 }
 
@@ -116,6 +116,12 @@ fn kinematics_yaml_says_the_same_as_the_urdf_that_it_belongs_to() {
     }
 }
 
+/// Markers of plate.csv, m.
+pub(super) fn positions(files: &Files) -> Vec<Vector3<f64>> {
+    let place = |row: &BTreeMap<String, String>| ["x_m", "y_m", "z_m"].map(|name| row[name].parse::<f64>().unwrap());
+    rows(files, "plate.csv").iter().map(|row| place(row).into()).collect()
+}
+
 #[test]
 fn files_chained_by_their_frames_give_the_camera_pose_of_the_solver() {
     for mount in [CameraMount::Hand, CameraMount::Fixed] {
@@ -136,8 +142,11 @@ fn files_chained_by_their_frames_give_the_camera_pose_of_the_solver() {
             let base_from = |p: &PoseYaml| if p.parent == chain.tip { tip * p.pose() } else { p.pose() };
             let camera_from_plate = base_from(&camera).inverse() * base_from(&plate);
             let solver = solution.fit.camera_by_readings(i).unwrap();
-            let (angle, distance) = camera_from_plate.distance(&solver);
-            assert!(angle < 1e-9 && distance < 1e-9, "{mount:?} {}: {angle:e} {distance:e}", image.name);
+            // The frame of plate.csv and plate_pose.yaml is that of the nominal markers: the markers stand where the solver has them.
+            for (k, at) in positions(&files).iter().enumerate() {
+                let off = camera_from_plate.transform(at) - solver.transform(&solution.fit.state.plates[0].position(k));
+                assert!(off.norm() < 1e-9, "{mount:?} {} {k}: {off:e}", image.name);
+            }
         }
         let parents = match mount {
             CameraMount::Hand => (&chain.tip, &chain.base),
@@ -206,12 +215,17 @@ fn the_corrected_plate_is_a_plate() {
     }
     let plate = read_plate(&folder.path().join("plate.toml"), &mut Vec::new()).unwrap();
     assert_eq!(plate.markers.len(), 48);
+    let shape = &solution.fit.state.plates[0];
     for (k, m) in plate.markers.iter().enumerate() {
-        assert_eq!(m.position_m, solution.fit.state.plates[0].position(k));
+        // As fitted, but for the frame: each is as far from the first, and they do not lie off the nominal ones as a whole.
+        let [own, fitted] = [m.position_m - plate.markers[0].position_m, shape.position(k) - shape.position(0)];
+        assert!((own.norm() - fitted.norm()).abs() < 1e-12, "marker {}", m.id);
         // Better than the print tolerance, and not better than the pixels of 24 images allow (0.05 px at 1100 px and 0.15 m).
         let floor = 0.05 / 1100.0 * 0.15 / 24f64.sqrt();
         assert!((floor..1e-4).contains(&m.sigma_m), "marker {}: {:e}", m.id, m.sigma_m);
     }
+    let off: Vector3<f64> = plate.markers.iter().zip(&shape.nominal).map(|(m, n)| m.position_m - n).sum();
+    assert!(off.norm() < 1e-9, "{off:e}");
 }
 
 #[test]

@@ -483,14 +483,14 @@ fn in_own_frames(fit: &Fit) -> Result<(Adjustment, Vec<f64>)> {
     let mut moved = state.clone();
     let mut sizes = vec![1.0; problem.plates.len()];
     for frame in frames(fit)? {
+        let similarity = Similarity::of(&frame, &fit.adjustment)?;
         for &plate in &frame.plates {
-            let similarity = Similarity::of(problem, &frame.seen, plate, &state.plates[plate])?;
-            let as_made = similarity.shape(&state.plates[plate], 1.0);
+            let as_made = similarity.shape(plate, &state.plates[plate], 1.0);
             let size = size_by_distance(&problem.plates[plate], &as_made).unwrap_or(1.0);
-            moved.plates[plate] = similarity.shape(&state.plates[plate], size);
+            moved.plates[plate] = similarity.shape(plate, &state.plates[plate], size);
             for (i, _) in problem.used().filter(|(_, image)| image.plate == plate) {
                 if let Tie::Free(pose) = &mut moved.ties[i] {
-                    *pose = similarity.pose(pose, size);
+                    *pose = similarity.pose(plate, pose, size);
                 }
             }
             sizes[plate] = size;

@@ -163,7 +163,7 @@ impl ImageRecords<'_> {
     pub fn plates(&self) -> Vec<PlateRecord> {
         let problem = &self.fit.problem;
         let plate = |(k, p): (usize, &Plate)| {
-            let shape = &self.fit.state.plates[k];
+            let shape = &self.gauge.plates[k];
             let sigmas = &self.gauge.positions[k];
             PlateRecord {
                 name: plate_name(problem, self.names, k),
@@ -211,7 +211,9 @@ impl ImageRecords<'_> {
                 readings: from.posture.map(|p| p.readings.clone()),
                 approach: from.posture.and_then(|p| p.approach.clone()),
                 joint_noise,
-                camera_from_plate: poses[k].as_ref().map(Into::into),
+                camera_from_plate: poses[k]
+                    .as_ref()
+                    .map(|pose| (&self.gauge.camera_from_plate(self.fit, k, pose)).into()),
                 free_pose: self.free_poses.poses[k].as_ref().map(|free| FreePoseRecord {
                     plate_from_camera: (&free.in_frame.plate_from_camera).into(),
                     covariance: flat(&free.in_frame.covariance),

@@ -207,9 +207,9 @@ pub struct PlateRecord {
     /// Estimated factor on them; 1 where the data do not tell it.
     #[serde(default = "one")]
     pub tolerance_factor: f64,
-    /// Corrections beside the modes, m.
+    /// Corrections beside the modes, m: they bring the markers into the frame of the nominal ones, too.
     pub correction_m: Vec<[f64; 3]>,
-    /// Corrected positions, m.
+    /// Corrected positions in the frame of the nominal markers, m: nominal, modes and corrections.
     pub position_m: Vec<[f64; 3]>,
     /// Their sigmas in the frame of the nominal markers, m; that of the scale of all of them is not in them.
     pub sigma_m: Vec<[f64; 3]>,
@@ -291,7 +291,7 @@ pub struct ImageRecord {
     pub approach: Option<Vec<f64>>,
     /// Estimated joint noise, rad or m.
     pub joint_noise: Option<Vec<f64>>,
-    /// `camera_from_plate` as estimated; from the readings alone for an image that is left out.
+    /// `camera_from_plate` as estimated, in the frame of the nominal markers; from the readings alone for an image that is left out.
     pub camera_from_plate: Option<PoseRecord>,
     /// Stand-alone pose.
     pub free_pose: Option<FreePoseRecord>,

@@ -137,7 +137,7 @@ fn placements(solution: &Solution, gauge: &Gauge) -> Vec<PlacedRecord> {
     let placed = |(k, name): (usize, &String)| {
         let determined = determined(solution, problem.layout.placements[k].start);
         let covariance = determined.then(|| flat(&gauge.placement(problem, k)));
-        PlacedRecord { name: name.clone(), pose: (&solution.fit.state.placements[k]).into(), covariance }
+        PlacedRecord { name: name.clone(), pose: (&gauge.placements[k]).into(), covariance }
     };
     problem.placements.iter().enumerate().map(placed).collect()
 }

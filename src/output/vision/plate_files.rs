@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::model::plate_modes::radius;
 use crate::output::gauge::Gauge;
 use crate::output::names::{file_names, plate_name};
-use crate::problem::Adjustment;
+use crate::problem::Problem;
 use crate::series::{Edge, plate_toml, to_csv};
 
 const HEADER: [&str; 9] =
@@ -14,20 +14,19 @@ const HEADER: [&str; 9] =
 ///
 /// # Errors
 /// A plate that cannot be written.
-pub fn plates(adjustment: &Adjustment, series: &[String], gauge: &Gauge) -> Result<Vec<(String, String)>> {
-    let problem = &adjustment.problem;
+pub fn plates(problem: &Problem, series: &[String], gauge: &Gauge) -> Result<Vec<(String, String)>> {
     let names: Vec<String> = (0..problem.plates.len()).map(|p| plate_name(problem, series, p)).collect();
     let (tomls, tables) = (file_names("plate", "toml", &names), file_names("plate", "csv", &names));
     let mut out = Vec::new();
     for (k, (toml, table)) in tomls.into_iter().zip(tables).enumerate() {
         out.push((toml, plate_toml(&problem.plates[k], Some(&table))?));
-        out.push((table, plate_csv(adjustment, k, gauge)));
+        out.push((table, plate_csv(problem, k, gauge)));
     }
     Ok(out)
 }
 
-fn plate_csv(Adjustment { problem, state }: &Adjustment, plate: usize, gauge: &Gauge) -> String {
-    let shape = &state.plates[plate];
+fn plate_csv(problem: &Problem, plate: usize, gauge: &Gauge) -> String {
+    let shape = &gauge.plates[plate];
     let covariances = &gauge.positions[plate];
     let mut rows = vec![HEADER.map(String::from).to_vec()];
     for (k, m) in problem.plates[plate].markers.iter().enumerate() {

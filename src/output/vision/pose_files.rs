@@ -105,7 +105,7 @@ pub fn placements(solution: &Solution, gauge: &Gauge) -> Vec<(String, String)> {
         let text = PoseFile {
             parent,
             child: if problem.placements.len() == 1 { "plate" } else { &problem.placements[k] },
-            pose: &solution.fit.state.placements[k],
+            pose: &gauge.placements[k],
             covariance: gauge.placement(problem, k),
             remark: INNER,
         };

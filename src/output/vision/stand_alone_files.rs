@@ -135,7 +135,7 @@ pub fn stand_alone_files(found: &StandAlone, context: &StandAloneContext) -> Res
     let (series, depths) = (&context.series, depths_m(problem, &found.free_poses));
     let (names, gauge) = (ImageNames::new(problem, series), Gauge::of(&found.fit)?);
     let cameras = camera_file::cameras(&problem.cameras, &state.cameras, &depths);
-    let plates = plate_files::plates(&found.fit, series, &gauge)?;
+    let plates = plate_files::plates(problem, series, &gauge)?;
     let poses = [("poses.csv".to_owned(), pose_files::poses_csv(&names, &found.free_poses))];
     let texts = cameras.into_iter().chain(plates).chain(poses);
     let mut files: BTreeMap<String, Vec<u8>> = texts.map(|(name, text)| (name, text.into_bytes())).collect();

@@ -241,63 +241,65 @@ impl Frame {
     }
 }
 
-/// A similarity: what is seen of the plate stays when its markers are put into the frame and poses follow.
-#[derive(Debug, Clone, Copy)]
+/// A similarity for the plates of one frame: what is seen of them stays when their markers are put into the frame and poses follow.
+#[derive(Debug, Clone)]
 pub struct Similarity {
     /// `old plate frame <- frame`.
-    motion: Pose,
-    /// Size in the old frame over that in the frame.
-    pub size: f64,
+    pub motion: Pose,
+    /// Plates with their size in the old frame over that in the frame.
+    sizes: Vec<(usize, f64)>,
 }
 
 impl Similarity {
-    /// From the frame that the nominal markers define, at nominal scale, to the one in which a shape stands.
+    /// From the frame that the nominal markers define, at nominal scales, to the one in which its plates stand.
     ///
     /// # Errors
     /// Markers that lie on a line.
-    pub fn of(problem: &Problem, seen: &BTreeSet<(usize, usize)>, plate: usize, shape: &PlateShape) -> Result<Self> {
-        let own: Vec<usize> = seen.iter().filter(|(p, _)| *p == plate).map(|(_, m)| *m).collect();
-        let mut found = Self { motion: Pose::identity(), size: 1.0 };
+    pub fn of(frame: &Frame, Adjustment { problem, state }: &Adjustment) -> Result<Self> {
+        let sizes = frame.plates.iter().map(|&plate| (plate, 1.0)).collect();
+        let mut found = Self { motion: Pose::identity(), sizes };
         for _ in 0..CORRECTIONS {
-            let at = |m: usize| found.undo(&shape.position(m));
-            let off = |m: usize| at(m) - shape.nominal[m];
-            let information = |m: usize| problem.marker_information(plate, m);
-            let rows = own.iter().map(|&m| (motions(&shape.nominal[m], 0, 1), motions(&at(m), 0, 1), information(m)));
-            let normal = Normal::of(rows, RIGID + 1, "plate")?;
-            let mut pull = DMatrix::zeros(RIGID + 1, 1);
-            own.iter().for_each(|&m| {
-                pull.gemm_tr(
-                    information(m),
-                    &motions(&shape.nominal[m], 0, 1),
-                    &DMatrix::from_column_slice(3, 1, off(m).as_slice()),
-                    1.0,
-                );
-            });
+            let at = |p: usize, m: usize| found.undo(p, &state.plates[p].position(m));
+            let nominal = |p: usize, m: usize| frame.motions(p, &state.plates[p].nominal[m]);
+            let seen = || frame.seen.iter().map(|&(p, m)| (p, m, problem.marker_information(p, m)));
+            let rows = seen().map(|(p, m, information)| (nominal(p, m), frame.motions(p, &at(p, m)), information));
+            let normal = Normal::of(rows, frame.len(), "plate")?;
+            let mut pull = DMatrix::zeros(frame.len(), 1);
+            for (p, m, information) in seen() {
+                let off = at(p, m) - state.plates[p].nominal[m];
+                pull.gemm_tr(information, &nominal(p, m), &DMatrix::from_column_slice(3, 1, off.as_slice()), 1.0);
+            }
             let step = normal.solve(&pull).ok_or_else(|| no_frame("plate"))?;
-            found.motion.translation += found.size * found.motion.rotation * step.fixed_view::<3, 1>(0, 0);
+            let size = found.sizes.iter().map(|(_, size)| size).sum::<f64>() / found.sizes.len() as f64;
+            found.motion.translation += size * found.motion.rotation * step.fixed_view::<3, 1>(0, 0);
             found.motion.rotation *= crate::geom::exp_so3(&step.fixed_view::<3, 1>(3, 0).into_owned());
-            found.size *= 1.0 + step[RIGID];
+            found.sizes.iter_mut().enumerate().for_each(|(k, (_, size))| *size *= 1.0 + step[RIGID + k]);
         }
         Ok(found)
     }
 
-    /// A place of the old frame, in the frame.
-    fn undo(&self, x: &Vector3<f64>) -> Vector3<f64> {
-        self.motion.inverse().transform(x) / self.size
+    /// Size of a plate of the frame over the nominal one.
+    pub fn size(&self, plate: usize) -> f64 {
+        self.sizes.iter().find(|(p, _)| *p == plate).map_or(1.0, |(_, size)| *size)
     }
 
-    /// The shape in the frame, `size` times as large as nominal; its modes stay.
-    pub fn shape(&self, shape: &PlateShape, size: f64) -> PlateShape {
+    /// A place of a plate in the old frame, in the frame.
+    fn undo(&self, plate: usize, x: &Vector3<f64>) -> Vector3<f64> {
+        self.motion.inverse().transform(x) / self.size(plate)
+    }
+
+    /// The shape of a plate in the frame, `size` times as large as nominal; its modes stay.
+    pub fn shape(&self, plate: usize, shape: &PlateShape, size: f64) -> PlateShape {
         let mut moved = shape.clone();
         for m in 0..shape.nominal.len() {
-            moved.corrections[m] += self.undo(&shape.position(m)) * size - shape.position(m);
+            moved.corrections[m] += self.undo(plate, &shape.position(m)) * size - shape.position(m);
         }
         moved
     }
 
     /// A camera pose (`camera_from_plate`) that has followed.
-    pub fn pose(&self, camera_from_plate: &Pose, size: f64) -> Pose {
+    pub fn pose(&self, plate: usize, camera_from_plate: &Pose, size: f64) -> Pose {
         let followed = *camera_from_plate * self.motion;
-        Pose::new(followed.rotation, followed.translation * (size / self.size))
+        Pose::new(followed.rotation, followed.translation * (size / self.size(plate)))
     }
 }
