@@ -164,6 +164,7 @@ codes! {
     Input "Series" {
         SeriesMissing "series_missing" "a folder is no series",
         SeriesTwice "series_twice" "two series have one name",
+        SeriesRepeated "series_repeated" "a series has the readings and measurements of another one, to the last digit",
         SeriesChanged "series_changed" "a file changed while it was read",
         SeriesDisagree "series_disagree" "series that share robot or camera contradict each other",
         ImageNotThere "image_not_there" "the file of an image that a table names is missing",
@@ -190,6 +191,7 @@ codes! {
         DictionaryUnknown "dictionary_unknown" "no dictionary of markers has this name",
         DictionaryGuessed "dictionary_guessed" "dictionary and size of the tags were found by trial",
         PlateSymmetric "plate_symmetric" "the plate looks the same after a turn",
+        PlatesAlike "plates_alike" "plates of several series are described alike, and taken for one",
         PlateImpossible "plate_impossible" "a plate cannot be designed, resolved, drawn or fitted on its sheet as asked for",
     }
     Input "Images" {

@@ -48,6 +48,7 @@ pub use observations::detections::{
     SeenSeries, Unused, detect_images, detect_stops, flat_field_drift, pictures, require_some,
 };
 pub use observations::measure::{MeasuredWithNotices, measure, measure_bodies};
+pub use observations::plates::name_plates;
 pub use observations::seen_image::SeenImage;
 pub use observations::stated::CameraStart;
 pub use options::{JointNoise, MarkerTolerance, Options};

@@ -30,10 +30,12 @@ pub(super) fn series_name(all: &[String], series: usize) -> String {
     all.get(series).cloned().unwrap_or_else(|| format!("series {}", series + 1))
 }
 
-/// Name of a plate: that of the first series that shows it.
+/// Name of a plate: as stated, else that of the first series that shows it.
 pub(super) fn plate_name(problem: &Problem, series: &[String], plate: usize) -> String {
+    let stated = problem.plates.get(plate).and_then(|p| p.name.clone());
     let first = problem.images.iter().find(|i| i.plate == plate);
-    first.map_or_else(|| format!("plate {}", plate + 1), |i| series_name(series, i.series))
+    let of_series = || first.map_or_else(|| format!("plate {}", plate + 1), |i| series_name(series, i.series));
+    stated.unwrap_or_else(of_series)
 }
 
 /// Names of all columns; those of several plates by series instead of by path.

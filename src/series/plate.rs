@@ -63,6 +63,9 @@ fn is_zero(number: &u32) -> bool {
 /// A plate of markers as designed (or as corrected by an earlier calibration).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plate {
+    /// What it is called, where that is stated: a plate of another name is another plate, however alike they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// What is printed.
     pub kind: PlateKind,
     /// Markers in a row (inner corners of a chessboard).
@@ -138,6 +141,7 @@ impl Plate {
             })
             .collect();
         Self {
+            name: None,
             kind,
             columns,
             rows,

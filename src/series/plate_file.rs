@@ -26,6 +26,9 @@ const KNOWN: [&str; 10] =
 #[serde(deny_unknown_fields)]
 struct PlateFile {
     format: u32,
+    /// What the plate is called: another name is another plate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
     kind: PlateKind,
     #[serde(skip_serializing_if = "Option::is_none")]
     columns: Option<u32>,
@@ -114,6 +117,7 @@ fn parse(path: &Path, toml: &str, marker_text: impl FnOnce(&Path) -> Result<Stri
     }
     check_dictionary(path, toml, &file)?;
     let mut plate = nominal(path, &file)?;
+    plate.name.clone_from(&file.name);
     if let Some(markers) = &file.markers {
         let csv = path.with_file_name(markers);
         let nominal = plate.clone();
@@ -167,6 +171,7 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
         let pitch_m = file.pitch_m.unwrap_or(0.0);
         let scale = file.scale;
         return Ok(Plate {
+            name: None,
             kind: file.kind,
             columns,
             rows,
@@ -482,6 +487,7 @@ pub fn plate_toml(plate: &Plate, markers: Option<&str>) -> Result<String> {
         "plate.toml",
         &PlateFile {
             format: 1,
+            name: plate.name.clone(),
             kind: plate.kind,
             columns: lattice.then_some(plate.columns),
             rows: lattice.then_some(plate.rows),

@@ -14,7 +14,7 @@ use crate::cli::terminal::progress;
 use crate::cli::terminal::say::{say, say_line};
 use crate::diagnose::Finding;
 use crate::error::{Code, Error, Notice, Result};
-use crate::identify::{PoseSigma, StandAlone, measure, stand_alone};
+use crate::identify::{PoseSigma, StandAlone, measure, name_plates, stand_alone};
 use crate::output::poses_record::{usual, worst};
 use crate::output::stand_alone_files::{self, StandAloneContext, stand_alone_files};
 use crate::output::{REPORT, ResultFolder, folder_name};
@@ -118,6 +118,7 @@ fn observe(series: &[Series], limits: &Limits) -> Result<(Vec<MeasuredSeries>, V
         notices.extend(found.notices);
         all.push(found.series);
     }
+    notices.extend(name_plates(&series.iter().collect::<Vec<_>>(), &mut all)?);
     Ok((all, notices))
 }
 

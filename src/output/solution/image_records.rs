@@ -167,6 +167,7 @@ impl ImageRecords<'_> {
             let sigmas = &self.gauge.positions[k];
             PlateRecord {
                 name: plate_name(problem, self.names, k),
+                stated_name: p.name.clone(),
                 kind: p.kind,
                 columns: p.columns,
                 rows: p.rows,

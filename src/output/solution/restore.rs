@@ -72,6 +72,7 @@ fn plate(p: &PlateRecord) -> Result<Plate> {
         sigma_m: p.prior_sigma_m[k],
     };
     Ok(Plate {
+        name: p.stated_name.clone(),
         kind: p.kind,
         columns: p.columns,
         rows: p.rows,

@@ -176,6 +176,9 @@ pub struct CameraRecord {
 pub struct PlateRecord {
     /// Name: that of the first series that shows it.
     pub name: String,
+    /// What its plate.toml calls it, where it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stated_name: Option<String>,
     /// What is printed on it.
     pub kind: PlateKind,
     /// Columns.
