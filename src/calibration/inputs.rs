@@ -7,7 +7,7 @@ use super::cell::{CellFiles, Ends};
 use super::pictures::Pictures;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Notice, Result};
-use crate::identify::{measure, name_plates};
+use crate::identify::{bring_together, measure};
 use crate::output::{recover, restore, solution_json::SolutionRecord};
 use crate::problem::MeasuredSeries;
 use crate::series::{self, InputFile, RecordingOptions, Series, Source};
@@ -137,7 +137,7 @@ impl Inputs {
         }
         all.iter().zip(&hashes).try_for_each(|(s, before)| require_unchanged(before, &s.image_hashes()?))?;
         let views: Vec<&Series> = all.iter().flat_map(Series::views).collect();
-        notices.extend(name_plates(&views, &mut series)?);
+        notices.extend(bring_together(&views, &hashes.concat(), &mut series)?);
         Ok(Observed { description, chain, series, notices, files })
     }
 }

@@ -48,9 +48,9 @@ pub use observations::detections::{
     SeenSeries, Unused, detect_images, detect_stops, flat_field_drift, pictures, require_some,
 };
 pub use observations::measure::{MeasuredWithNotices, measure, measure_bodies};
-pub use observations::plates::name_plates;
 pub use observations::seen_image::SeenImage;
 pub use observations::stated::CameraStart;
+pub use observations::together::bring_together;
 pub use options::{JointNoise, MarkerTolerance, Options};
 pub use photogrammetry::free_poses::adjust_free_poses;
 pub use photogrammetry::pose_comparison::{OtherBody, PoseComparison, PoseDifference, compare_poses};

@@ -155,6 +155,7 @@ fn what_is_written_reads_back_the_same() {
         sigma_m: sigma,
     };
     let points = Plate {
+        name: Some("print 2".into()),
         kind: PlateKind::Points,
         columns: 0,
         rows: 0,

@@ -16,3 +16,4 @@ mod robots;
 #[path = "../said/mod.rs"]
 mod said;
 mod series;
+mod several_series;

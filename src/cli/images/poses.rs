@@ -14,7 +14,7 @@ use crate::cli::terminal::progress;
 use crate::cli::terminal::say::{say, say_line};
 use crate::diagnose::Finding;
 use crate::error::{Code, Error, Notice, Result};
-use crate::identify::{PoseSigma, StandAlone, measure, name_plates, stand_alone};
+use crate::identify::{PoseSigma, StandAlone, bring_together, measure, stand_alone};
 use crate::output::poses_record::{usual, worst};
 use crate::output::stand_alone_files::{self, StandAloneContext, stand_alone_files};
 use crate::output::{REPORT, ResultFolder, folder_name};
@@ -77,6 +77,7 @@ pub fn run(args: &PosesArgs) -> Result<Verdict> {
     let (mut measured, seen) = observe(&views, &limits)?;
     notices.extend(seen);
     series.iter().zip(&hashes).try_for_each(|(s, before)| require_unchanged(before, &s.image_hashes()?))?;
+    notices.extend(bring_together(&views.iter().collect::<Vec<_>>(), &hashes.concat(), &mut measured)?);
     notices.extend(args.cameras.apply(&mut measured)?);
     let found = stand_alone(&measured, &limits)?;
     notices.extend(found.notices.iter().cloned());
@@ -118,7 +119,6 @@ fn observe(series: &[Series], limits: &Limits) -> Result<(Vec<MeasuredSeries>, V
         notices.extend(found.notices);
         all.push(found.series);
     }
-    notices.extend(name_plates(&series.iter().collect::<Vec<_>>(), &mut all)?);
     Ok((all, notices))
 }
 

@@ -37,7 +37,7 @@ impl Known<'_> {
 ///
 /// # Errors
 /// Plates of one `name` that are described otherwise.
-pub fn name_plates(views: &[&Series], measured: &mut [MeasuredSeries]) -> Result<Vec<Notice>> {
+pub(super) fn name_plates(views: &[&Series], measured: &mut [MeasuredSeries]) -> Result<Vec<Notice>> {
     let mut all: Vec<Known> = Vec::new();
     for (view, own) in views.iter().zip(measured).filter(|(_, own)| own.has_images) {
         // Sizes of dots that the detector found are no part of the description.

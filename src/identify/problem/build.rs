@@ -1,11 +1,12 @@
 //! Identified series to a problem: who shares what, by name.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use nalgebra::{Matrix2, Vector2};
 
 use super::bodies::Bodies;
 use super::local_errors::{local_share, local_terms};
+use super::seen_before::SeenBefore;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
@@ -35,6 +36,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     let (mut lenses, mut plates): (Vec<Camera>, Vec<Plate>) = (vec![], vec![]);
     let (mut stops, places) = stops_of(series);
     let mut images: Vec<Image> = vec![];
+    let mut seen_before = SeenBefore::default();
     for (index, s) in series.iter().enumerate().filter(|(_, s)| s.has_images) {
         let camera = intern(&mut cameras, &s.camera);
         if camera == lenses.len() {
@@ -58,10 +60,10 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
             plates.push(s.plate.clone());
         }
         let mounting = intern(&mut mountings, &s.mounting);
-        let originals = originals(&s.stops);
+        let originals = seen_before.originals(s);
         for (row, stop) in s.stops.iter().enumerate() {
             let observations = measured(stop, s)?;
-            let duplicate = originals[row].map(|of| ImageRejection::Duplicate { of: s.stops[of].image.clone() });
+            let duplicate = originals[row].clone().map(|of| ImageRejection::Duplicate { of });
             let rejected = stop.left_out.clone().or(duplicate).or_else(|| {
                 let found = observations.len();
                 let needed = limits.image_observations;
@@ -196,19 +198,6 @@ fn first_local(state: &State, layout: &Layout) -> Vec<f64> {
 /// Covariance uu, uv, vv of an observation as the detector states it, px^2; the usual one where it states none.
 pub fn stated_covariance(observation: &Observation) -> [f64; 3] {
     observation.covariance.unwrap_or([DEFAULT_SIGMA_PX.powi(2), 0.0, DEFAULT_SIGMA_PX.powi(2)])
-}
-
-/// Of every image the first one before it that shows exactly the same.
-fn originals(stops: &[MeasuredStop]) -> Vec<Option<usize>> {
-    let mut before: HashMap<_, Vec<usize>> = HashMap::new();
-    let original = |(row, stop): (usize, &MeasuredStop)| {
-        let first = stop.observations.first()?;
-        let alike = before.entry((first.marker, first.uv.map(f64::to_bits))).or_default();
-        let original = alike.iter().copied().find(|&k| stops[k].observations == stop.observations);
-        alike.push(row);
-        original
-    };
-    stops.iter().enumerate().map(original).collect()
 }
 
 fn measured(stop: &MeasuredStop, s: &MeasuredSeries) -> Result<Vec<MarkerObservation>> {
