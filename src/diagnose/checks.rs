@@ -9,9 +9,9 @@ use super::left_out::{
 use super::steps::{loose, pose_step};
 use super::{
     camera_model, camera_pattern, contradicted_distances, extrapolates, few_images, focus, held_near_nominal,
-    joint_noise, length_standard, marker_off, measurement_scatter, no_gain, odd_image, parameter_off, plate_size,
-    reading_ratio, repeated_measurements, rounded_readings, scatter, small_gain, stated_noise, tag_size, undetermined,
-    zeros_off,
+    joint_noise, length_standard, marker_off, measurement_scatter, mirror_image, no_gain, odd_image, parameter_off,
+    plate_size, reading_ratio, repeated_measurements, rounded_readings, scatter, small_gain, stated_noise, tag_size,
+    undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -143,6 +143,7 @@ pub const CHECKS: &[Check] = &[
     check("left_out_bodies", Stage::LeftOut(|a, s| found(left_out_bodies::check(a, s)))),
     check("measurement_scatter", Stage::Fit(|a, b, s| found(measurement_scatter::check(a, b, s)))),
     check("left_out_observations", Stage::LeftOut(|a, s| found(left_out_observations::check(a, s)))),
+    check("mirror_image", Stage::Fit(|a, b, s| found(mirror_image::check(a, b, s)))),
     check("no_gain", Stage::Fit(|a, b, s| found(no_gain::check(a, b, s)))),
     check("zeros_off", Stage::LeftOut(|a, s| found(zeros_off::check(a, s)))),
     check("plate_size", Stage::Fit(|a, b, s| found(plate_size::check(a, b, s)))),

@@ -24,6 +24,7 @@ use super::length_standard::ContradictedLengths;
 use super::lens_not_in_ros::LensNotInRos;
 use super::marker_off::MarkerOff;
 use super::measurement_scatter::MeasurementsScatter;
+use super::mirror_image::MirrorImageFits;
 use super::mistake::Mistake;
 use super::no_gain::NoGain;
 use super::noticed::Noticed;
@@ -96,6 +97,7 @@ findings! {
     MarkerOff,
     MeasurementsLeftOut,
     MeasurementsScatter,
+    MirrorImageFits,
     Mistake,
     BodyMoved,
     NoGain,

@@ -5,6 +5,7 @@ pub mod circle;
 pub mod inverse;
 pub mod joint_terms;
 pub mod mdh;
+pub mod mirror;
 pub mod mount;
 pub mod plate_modes;
 pub mod robot;

@@ -13,3 +13,4 @@ mod gravity;
 mod independent;
 mod jacobians;
 mod lenses;
+mod mirror;
