@@ -9,6 +9,20 @@ use crate::series::CameraMount;
 pub enum MistakeKind {
     /// Readings have the wrong sign.
     Signs(Vec<String>),
+    /// The same, or those of others, with which the arm is its mirror image.
+    SignsOrMirror {
+        /// The joints.
+        joints: Vec<String>,
+        /// The others.
+        others: Vec<String>,
+    },
+    /// The axes of an instrument are left-handed, or the readings of these joints have the wrong sign: the arm is its mirror image.
+    MirrorImage {
+        /// The joints.
+        joints: Vec<String>,
+        /// What to do where it is the axes.
+        axes: String,
+    },
     /// Columns stand in each other's place: the first takes the readings of the second, and so on, the last those of the first.
     Columns(Vec<String>),
     /// All columns stand in reverse order: these, from base to tip.
@@ -47,8 +61,9 @@ pub enum MistakeKind {
     },
     /// The camera is mounted in the way that is not stated.
     Mount(CameraMount),
-    /// The images show the scene mirrored, and may be turned as well.
-    Mirrored,
+    /// The images show the scene mirrored, and may be turned as well, or the readings of these joints have the wrong sign, where the arm has a
+    /// mirror image.
+    Mirrored(Vec<String>),
     /// Directions fit and distances do not, medians over the images.
     Lengths {
         /// Of the directions, rad.
@@ -164,15 +179,49 @@ impl Mistake {
     /// Joints that it is about; none where it is about all.
     fn joints(&self) -> &[String] {
         match &self.kind {
-            MistakeKind::Signs(joints) | MistakeKind::Columns(joints) | MistakeKind::Rows { columns: joints, .. } => {
-                joints
-            }
+            MistakeKind::Signs(joints)
+            | MistakeKind::SignsOrMirror { joints, .. }
+            | MistakeKind::Columns(joints)
+            | MistakeKind::Rows { columns: joints, .. } => joints,
             MistakeKind::Unit { joint, .. } => joint.as_slice(),
             MistakeKind::SlideUnit { joint, .. } => std::slice::from_ref(joint),
             MistakeKind::Coupled { joints, .. } => &joints[..1],
             _ => &[],
         }
     }
+}
+
+/// Names in a sentence.
+fn listed(names: &[String]) -> String {
+    match names {
+        [before @ .., last] if !before.is_empty() => format!("{} and {last}", before.join(", ")),
+        _ => names.concat(),
+    }
+}
+
+fn signs_wrong(joints: &[String], noun: &str) -> String {
+    let negated = match joints {
+        [one] => one.as_str(),
+        [_, _] => "both",
+        _ => "all of them",
+    };
+    format!("the readings of {} have the wrong sign: with {negated} negated the {noun}s fit", listed(joints))
+}
+
+fn signs_changed(joints: &[String]) -> String {
+    let (columns, axes) = if joints.len() == 1 { ("column", "axis") } else { ("columns", "axes") };
+    let names = listed(joints);
+    format!(
+        "negate the {columns} {names} of joints.csv, or the {axes} of {names} in the URDF if the controller counts that way"
+    )
+}
+
+/// How the arm itself tells which way a joint counts.
+fn turned_by_hand(joints: &[String]) -> String {
+    let joint = joints.first().map_or("", String::as_str);
+    format!(
+        "move {joint} alone to a larger reading, and see whether it turns about its axis in the URDF as a right-hand screw (a slide: goes along it)"
+    )
 }
 
 const fn unit(are_degrees: bool) -> [&'static str; 3] {
@@ -182,13 +231,14 @@ const fn unit(are_degrees: bool) -> [&'static str; 3] {
 impl Kind for Mistake {
     fn code(&self) -> Code {
         match &self.kind {
-            MistakeKind::Signs(_) => Code::JointSignWrong,
+            MistakeKind::Signs(_) | MistakeKind::SignsOrMirror { .. } => Code::JointSignWrong,
+            MistakeKind::MirrorImage { .. } => Code::AxesMirrored,
             MistakeKind::Columns(_) | MistakeKind::Reversed(_) => Code::JointOrderWrong,
             MistakeKind::Unit { .. } | MistakeKind::SlideUnit { .. } => Code::JointUnitWrong,
             MistakeKind::Coupled { .. } => Code::JointCoupled,
             MistakeKind::Rows { .. } => Code::RowsShifted,
             MistakeKind::Mount(_) => Code::CameraMountWrong,
-            MistakeKind::Mirrored => Code::ImagesMirrored,
+            MistakeKind::Mirrored(_) => Code::ImagesMirrored,
             MistakeKind::Lengths { .. } => Code::LinkLengthsWrong,
             MistakeKind::PlateSize { .. } => Code::PlatePitchWrong,
             MistakeKind::Poses { code, .. } => *code,
@@ -204,9 +254,14 @@ impl Kind for Mistake {
             let subject = if self.by_images { Subject::Image } else { Subject::Stop };
             return [first, last].into_iter().cloned().map(subject).collect();
         }
-        match self.joints() {
-            [] => vec![Subject::Body(self.of.clone())],
-            joints => joints.iter().cloned().map(Subject::Joint).collect(),
+        let joints = |joints: &[String]| joints.iter().cloned().map(Subject::Joint).collect::<Vec<_>>();
+        let of = || vec![Subject::Body(self.of.clone())];
+        match &self.kind {
+            MistakeKind::MirrorImage { joints: mirrored, .. } | MistakeKind::Mirrored(mirrored) => {
+                [of(), joints(mirrored)].concat()
+            }
+            _ if self.joints().is_empty() => of(),
+            _ => joints(self.joints()),
         }
     }
 
@@ -242,12 +297,12 @@ impl Kind for Mistake {
 
     fn remedy(&self) -> String {
         match &self.kind {
-            MistakeKind::Signs(joints) => {
-                let (columns, axes) = if joints.len() == 1 { ("column", "axis") } else { ("columns", "axes") };
-                let names = joints.join(" and ");
-                format!(
-                    "negate the {columns} {names} of joints.csv, or the {axes} of {names} in the URDF if the controller counts that way"
-                )
+            MistakeKind::Signs(joints) => signs_changed(joints),
+            MistakeKind::SignsOrMirror { joints, others } => {
+                format!("{}: if it does not, {}; else {}", turned_by_hand(others), signs_changed(others), signs_changed(joints))
+            }
+            MistakeKind::MirrorImage { joints, axes } => {
+                format!("{}: if it does, {axes}; else {}", turned_by_hand(joints), signs_changed(joints))
             }
             MistakeKind::Columns(joints) if joints.len() == 2 => {
                 format!("exchange the column names {} in joints.csv", joints.join(" and "))
@@ -290,8 +345,12 @@ impl Kind for Mistake {
                 let word = if *mount == CameraMount::Hand { "hand" } else { "fixed" };
                 format!("write camera_mount = \"{word}\" in series.toml (of a recording: in the .toml of its name)")
             }
-            MistakeKind::Mirrored => {
-                "mirror the images back, or have camera and converter write them as the sensor sees (no mirroring, no exchange of rows and columns); if they are right, negate the joints that turn the arm to its sides, as A1, A4 and A6 of an arm with six joints".into()
+            MistakeKind::Mirrored(joints) => {
+                let mirrored = "mirror the images back, or have camera and converter write them as the sensor sees (no mirroring, no exchange of rows and columns)";
+                match joints.as_slice() {
+                    [] => format!("{mirrored}; if they are right, negate the joints that turn the arm to its sides"),
+                    joints => format!("{mirrored}; if they are right, {}", signs_changed(joints)),
+                }
             }
             MistakeKind::Lengths { constant: Some(joint), .. } => format!(
                 "look whether {joint} moved between the stops: write its readings into joints.csv; if it stood still, check that the URDF is of this robot and size, with lengths in metres"
@@ -311,10 +370,15 @@ impl Mistake {
     /// What was done wrong, by what shows it: `noun` names one of it.
     fn in_words(&self, noun: &str) -> String {
         match &self.kind {
-            MistakeKind::Signs(joints) => format!(
-                "the readings of {} have the wrong sign: with {} negated the {noun}s fit",
-                joints.join(" and "),
-                if let [one] = joints.as_slice() { one } else { "both" }
+            MistakeKind::Signs(joints) => signs_wrong(joints, noun),
+            MistakeKind::SignsOrMirror { joints, others } => format!(
+                "{}; with {} negated, as the mirror image of the arm, they fit alike, and do not tell which",
+                signs_wrong(joints, noun),
+                listed(others)
+            ),
+            MistakeKind::MirrorImage { joints, .. } => format!(
+                "its axes are left-handed, or the readings of {} have the wrong sign: either makes the arm its mirror image, with either undone the {noun}s fit, and they do not tell which",
+                listed(joints)
             ),
             MistakeKind::Columns(joints) if joints.len() == 2 => {
                 format!("the joints stand in another order: with {} exchanged the {noun}s fit", joints.join(" and "))
@@ -368,9 +432,13 @@ impl Mistake {
             MistakeKind::Mount(CameraMount::Fixed) => {
                 format!("the camera stands still and the plate is in the hand: read so, the {noun}s fit")
             }
-            MistakeKind::Mirrored => {
+            MistakeKind::Mirrored(joints) => {
+                let joints = match joints.as_slice() {
+                    [] => "all joints that turn the arm to its sides".to_owned(),
+                    joints => listed(joints),
+                };
                 format!(
-                    "the {noun}s are mirrored (or their rows and columns are exchanged), or all joints that turn the arm to its sides count the other way: with either undone the {noun}s fit, and they do not tell which"
+                    "the {noun}s are mirrored (or their rows and columns are exchanged), or {joints} count the other way: with either undone the {noun}s fit, and they do not tell which"
                 )
             }
             MistakeKind::Lengths { angle_rad, distance_m, constant } => {

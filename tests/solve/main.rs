@@ -23,6 +23,7 @@ mod knowledge;
 mod lens_study;
 mod marker_tolerance;
 mod measured_worlds;
+mod mirror_image;
 mod mixtures;
 mod moved_in_time;
 mod normal_equations;

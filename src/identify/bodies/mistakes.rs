@@ -11,16 +11,19 @@ use super::rows_of::rows_of_bodies;
 use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, MistakeKind};
 use crate::error::Result;
+use crate::identify::mistakes::likeliest::{Explained, likeliest};
 use crate::identify::mistakes::misread::all_misread;
-use crate::identify::mistakes::readings::{columns_undone, whole_and_parted};
+use crate::identify::mistakes::readings::{columns_undone, mirrored_signs_undone, whole_and_parted};
+use crate::identify::mistakes::suspects::some_of;
+use crate::linalg::lower_median;
 use crate::model::robot::Robot;
-use crate::problem::{Adjustment, BodySeen, Problem};
+use crate::problem::{Adjustment, BodyMeasurement, BodySeen, Problem};
 
 /// What was seen with a mistake undone, and its name.
 type Undone = (Vec<SeenAt>, MistakeKind);
 
 /// Refuses measurements and readings that fit with one of the usual mistakes undone, and only then. `misfit` is the median misfit of poses
-/// (rad + m), or of points (m), with given readings.
+/// (rad + m), or of points (m), with given readings. A small one may have a mistake, too: the sign of a joint moves a body near its axis by little.
 ///
 /// # Errors
 /// The mistake that explains most.
@@ -32,33 +35,57 @@ pub(super) fn name_mistake(
 ) -> Result<()> {
     let Adjustment { problem, state } = adjustment;
     let robot = &state.robot;
-    let given: Vec<SeenAt> =
+    let mut given: Vec<SeenAt> =
         measured.iter().filter_map(|k| SeenAt::of(problem, &problem.body_measurements[*k])).collect();
-    let as_described = misfit(robot, &given);
-    if as_described < limits.suspicious_misfit || robot.chain.pose_coordinates().is_some() {
+    let of_all = misfit(robot, &given);
+    let is_suspicious = of_all >= limits.suspicious_misfit;
+    if !(is_suspicious || is_contradicted(problem, measured, of_all, limits))
+        || robot.chain.pose_coordinates().is_some()
+    {
         return Ok(());
     }
+    if !is_suspicious {
+        given = some_of(given.len()).map(|k| given[k].at(given[k].readings.clone())).collect();
+    }
+    let as_described = misfit(robot, &given);
     let readings: Vec<Vec<f64>> = given.iter().map(|s| s.readings.clone()).collect();
     let read_otherwise = all_misread().filter_map(|misread| {
         let undone = |s: &SeenAt| Some(SeenAt { seen: misread.undone(s.seen)?, ..s.at(s.readings.clone()) });
         Some((given.iter().map(undone).collect::<Option<Vec<_>>>()?, misread.kind()))
     });
-    let of_columns = columns_undone(robot, &readings).into_iter().map(|(readings, kind)| {
+    let signs = mirrored_signs_undone(robot, &readings, limits.suspicious_misfit);
+    let of_columns = columns_undone(robot, &readings).into_iter().chain(signs).map(|(readings, kind)| {
         let undone = given.iter().zip(readings).map(|(s, readings)| s.at(readings));
         (undone.collect(), kind)
     });
-    let undone: Vec<Undone> = read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, &given)).collect();
-    let tried = undone.into_par_iter().map(|(undone, kind)| (misfit(robot, &undone), kind));
-    let best = tried
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .filter(|(left, _)| *left < limits.mistake_explains * as_described && *left < limits.suspicious_misfit);
-    best.map_or(Ok(()), |(left, kind)| {
+    let undone = read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, &given));
+    // In sockets an arm that hardly moves fits without a cause.
+    let is_tried = |(_, kind): &Undone| {
+        let hardly_moves = matches!(kind, MistakeKind::Unit { joint: None, are_degrees: true });
+        !hardly_moves || is_suspicious
+    };
+    let undone: Vec<Undone> = undone.filter(is_tried).collect();
+    let tried: Vec<Explained> = undone.into_par_iter().map(|(undone, kind)| (misfit(robot, &undone), kind)).collect();
+    let most = limits.suspicious_misfit.min(limits.mistake_explains * as_described);
+    let explaining: Vec<Explained> = tried.into_iter().filter(|(left, _)| *left < most).collect();
+    likeliest(&explaining, robot, limits).map_or(Ok(()), |(named, kind)| {
+        let left = explaining[named].0;
         let instrument = &problem.instruments[given[0].instrument];
         let of = instrument.place();
         let rows_of = rows_of_bodies(adjustment, measured, limits);
         let mistake = Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of };
         Err(Finding::from(mistake).refusal())
     })
+}
+
+/// True where a misfit is many times what is stated, of measurements enough to tell a mistake from chance.
+fn is_contradicted(problem: &Problem, measured: &[usize], misfit: f64, limits: &Limits) -> bool {
+    let stated = |k: &usize| {
+        let BodyMeasurement { seen, sigma_m, sigma_rad, .. } = problem.body_measurements[*k];
+        if matches!(seen, BodySeen::Pose(_)) { sigma_m + sigma_rad } else { sigma_m }
+    };
+    let sigma = lower_median(measured.iter().map(stated));
+    measured.len() >= 2 * FEWEST_POINTS && misfit > limits.touch_factor * sigma
 }
 
 /// Readings of the next stop, or the one before, in its series: of those in joints.csv, and of those that were measured. A stop at the end has none.

@@ -17,8 +17,9 @@ use crate::diagnose::{Finding, Mistake, MistakeKind, RowsOf};
 use crate::error::Code;
 use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touch, Touches, closed_form, fit};
 use crate::geom::{Pose, log_so3, rigid_fit};
+use crate::identify::mistakes::likeliest::{Explained, likeliest};
 use crate::identify::mistakes::misread::all_misread;
-use crate::identify::mistakes::readings::mistakes_undone;
+use crate::identify::mistakes::readings::{Undone as ReadingsUndone, mirrored_signs_undone, mistakes_undone};
 use crate::problem::BodySeen;
 
 /// Of mistakes of one kind, those that are fitted: the closed form fits them best.
@@ -167,6 +168,7 @@ fn explained(
     });
     let kinds = [
         read_otherwise(robot, touches).map(with_given).collect(),
+        mirrored(robot, touches, limits).map(with_given).collect(),
         places.into_iter().map(with_given).collect(),
         single.into_iter().map(with_given).collect(),
         tools.map(with_given).collect(),
@@ -178,10 +180,29 @@ fn explained(
     let tried = |undone: Undone| {
         fit(robot, &undone.touches, &undone.given, limits).ok().filter(explains).map(|fit| (fit, undone))
     };
-    let (best, undone) =
-        all.into_par_iter().filter_map(tried).min_by(|a, b| by_rank(rank(a, limits), rank(b, limits)))?;
+    let (best, undone) = best_of(all.into_par_iter().filter_map(tried).collect(), robot, limits)?;
     let one_of = one_of(robot, touches, given, (&best, &undone.what, found, limits));
     Some((best, Undone { what: one_of.map_or(undone.what, What::OneOf), ..undone }))
+}
+
+/// The best of those that explain: of readings and axes with what fits alike.
+fn best_of(mut all: Vec<(FrameFit, Undone)>, robot: &KnownRobot, limits: &Limits) -> Option<(FrameFit, Undone)> {
+    let (left_out, takes_more, _) = all.iter().map(|found| rank(found, limits)).min_by(|a, b| by_rank(*a, *b))?;
+    all.retain(|found| {
+        let (own, more, _) = rank(found, limits);
+        (own, more) == (left_out, takes_more)
+    });
+    let explained = |(fit, undone): &(FrameFit, Undone)| match &undone.what {
+        What::Kind(kind) => Some((fit.contradiction(limits), kind.clone())),
+        _ => None,
+    };
+    let kinds: Vec<Explained> = all.iter().filter_map(explained).collect();
+    if kinds.len() < all.len() {
+        return all.into_iter().min_by(|a, b| by_rank(rank(a, limits), rank(b, limits)));
+    }
+    let (named, kind) = likeliest(&kinds, robot.exported(), limits)?;
+    let (fit, undone) = all.swap_remove(named);
+    Some((fit, Undone { what: What::Kind(kind), ..undone }))
 }
 
 /// True where a fit leaves little of what contradicts another.
@@ -237,14 +258,26 @@ fn by_rank(a: (usize, bool, f64), b: (usize, bool, f64)) -> Ordering {
     (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2))
 }
 
+fn readings(touches: &Touches) -> Vec<Vec<f64>> {
+    touches.postures.iter().map(|p| p.readings.clone()).collect()
+}
+
+fn with_readings(touches: &Touches, (readings, kind): ReadingsUndone) -> (Touches, What) {
+    let mut undone = touches.clone();
+    undone.postures.iter_mut().zip(readings).for_each(|(p, readings)| p.readings = readings);
+    (undone, What::Kind(kind))
+}
+
+/// The readings of a mirror image: they are fitted whatever fits better by the closed form.
+fn mirrored(robot: &KnownRobot, touches: &Touches, limits: &Limits) -> impl Iterator<Item = (Touches, What)> {
+    let of_mirror = mirrored_signs_undone(robot.exported(), &readings(touches), limits.suspicious_misfit);
+    of_mirror.into_iter().map(move |undone| with_readings(touches, undone))
+}
+
 /// Other readings, or all places otherwise.
 fn read_otherwise(robot: &KnownRobot, touches: &Touches) -> impl Iterator<Item = (Touches, What)> {
-    let readings: Vec<Vec<f64>> = touches.postures.iter().map(|p| p.readings.clone()).collect();
-    let of_readings = mistakes_undone(robot.exported(), &readings).into_iter().map(|(readings, kind)| {
-        let mut undone = touches.clone();
-        undone.postures.iter_mut().zip(readings).for_each(|(p, readings)| p.readings = readings);
-        (undone, What::Kind(kind))
-    });
+    let of_readings = mistakes_undone(robot.exported(), &readings(touches)).into_iter();
+    let of_readings = of_readings.map(move |undone| with_readings(touches, undone));
     let of_places = all_misread().filter(|_| touches.frame.is_some()).filter_map(|misread| {
         let mut undone = touches.clone();
         for touch in &mut undone.all {

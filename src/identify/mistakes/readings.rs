@@ -1,12 +1,13 @@
 //! The usual mistakes in joint readings, each undone.
 
 use crate::diagnose::MistakeKind;
+use crate::model::mirror::mirror_images;
 use crate::model::robot::Robot;
 use crate::series::{LENGTH_UNITS, LengthUnit};
 use crate::urdf::JointKind;
 
 /// The readings of all stops with one mistake undone, and its name.
-pub(super) type Undone = (Vec<Vec<f64>>, MistakeKind);
+pub(in crate::identify) type Undone = (Vec<Vec<f64>>, MistakeKind);
 
 /// Every one of a single joint, of two or three, of all, and of rows.
 pub(in crate::identify) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> {
@@ -63,6 +64,29 @@ pub(in crate::identify) fn columns_undone(robot: &Robot, given: &[Vec<f64>]) -> 
     }
     add(MistakeKind::Reversed(names.clone()), &|q| q.reverse());
     all
+}
+
+/// Signs of three joints and more: those that make a mirror image of the arm, and those that do beside another wrong sign. Axes may be off by
+/// `tolerance`, rad and m.
+pub(in crate::identify) fn mirrored_signs_undone(robot: &Robot, given: &[Vec<f64>], tolerance: f64) -> Vec<Undone> {
+    let names = &robot.chain.readings;
+    let of_mirror = |mirror: Vec<usize>| {
+        let one = names.iter().map(|name| signs_of_others(robot, std::slice::from_ref(name), &mirror));
+        std::iter::once(signs_of_others(robot, &[], &mirror)).chain(one).collect::<Vec<_>>()
+    };
+    let signs = mirror_images(&robot.chain, tolerance).into_iter().flat_map(of_mirror);
+    let undone = signs.filter(|joints| joints.len() > 2).map(|joints| {
+        let sign: Vec<f64> = names.iter().map(|name| if joints.contains(name) { -1.0 } else { 1.0 }).collect();
+        let negated = |q: &Vec<f64>| -> Vec<f64> { q.iter().zip(&sign).map(|(q, sign)| q * sign).collect() };
+        (given.iter().map(negated).collect(), MistakeKind::Signs(joints))
+    });
+    undone.collect()
+}
+
+/// The joints whose signs, beside those of a mirror image (readings by their indices), are those that these joints have wrong.
+pub(super) fn signs_of_others(robot: &Robot, joints: &[String], mirror: &[usize]) -> Vec<String> {
+    let names = robot.chain.readings.iter().enumerate();
+    names.filter(|(k, name)| mirror.contains(k) != joints.contains(name)).map(|(_, name)| name.clone()).collect()
 }
 
 /// Shifted rows of all columns, and of some: positioner, rail or second arm stand before the first arm, or behind it, and may have been recorded

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::name_order::in_other_orders;
-use super::readings::{Undone, mistakes_undone, shifted_rows};
+use super::readings::{Undone, mistakes_undone, shifted_rows, signs_of_others};
 use crate::assess::Limits;
 use crate::diagnose::MistakeKind;
 use crate::error::Code;
@@ -14,6 +14,7 @@ use crate::geom::Pose;
 use crate::identify::start::bases;
 use crate::init::{PosePair, SeenStop, hand_eye_misfit, plate_scale, solve_hand_eye};
 use crate::linalg::median;
+use crate::model::mirror::mirror_images;
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
 use crate::series::{CameraMount, LENGTH_UNITS, spread};
@@ -34,7 +35,7 @@ pub(in crate::identify) struct Suspects<'a> {
 pub(in crate::identify) const ENOUGH: usize = 100;
 
 /// Those of `n` images by which a mistake is seen to explain the misfit of all.
-pub(super) fn some_of(n: usize) -> impl Iterator<Item = usize> {
+pub(in crate::identify) fn some_of(n: usize) -> impl Iterator<Item = usize> {
     spread(n, ENOUGH)
 }
 
@@ -176,7 +177,9 @@ impl Suspects<'_> {
             let Pose { rotation, translation } = stop.camera_from_plate;
             SeenStop { camera_from_plate: Pose::new(mirror * rotation * mirror, mirror * translation), ..stop }
         };
-        (self.misfit_with(&self.readings(), changed), MistakeKind::Mirrored)
+        let mirror = mirror_images(&self.robot.chain, self.limits.suspicious_misfit).into_iter().next();
+        let joints = signs_of_others(self.robot, &[], &mirror.unwrap_or_default());
+        (self.misfit_with(&self.readings(), changed), MistakeKind::Mirrored(joints))
     }
 
     /// Directions fit and distances do not: the axes of this arm with other lengths.

@@ -1,0 +1,77 @@
+//! Of mistakes that explain a misfit, the one that is named, with what the data do not tell from it.
+
+use std::mem::discriminant;
+
+use super::readings::signs_of_others;
+use crate::assess::Limits;
+use crate::diagnose::MistakeKind;
+use crate::error::Code;
+use crate::model::mirror::mirror_images;
+use crate::model::robot::Robot;
+
+/// What is left with a mistake undone, and the mistake.
+pub(in crate::identify) type Explained = (f64, MistakeKind);
+
+/// The index of the mistake that is named, and what is said of it: the one that leaves least, or one of fewer joints that leaves as much. Where the
+/// mirror image of the arm fits alike, that is said, too.
+pub(in crate::identify) fn likeliest(
+    tried: &[Explained],
+    robot: &Robot,
+    limits: &Limits,
+) -> Option<(usize, MistakeKind)> {
+    let by_left = |a: &usize, b: &usize| tried[*a].0.total_cmp(&tried[*b].0);
+    let best = (0..tried.len()).min_by(by_left)?;
+    let (least, kind) = &tried[best];
+    let is_alike = |k: &usize| {
+        let (left, other) = &tried[*k];
+        joints(kind).is_some()
+            && discriminant(other) == discriminant(kind)
+            && limits.zeros_explain_share * left <= *least
+    };
+    let fewest = |a: &usize, b: &usize| joints(&tried[*a].1).cmp(&joints(&tried[*b].1)).then(by_left(a, b));
+    let named = (0..tried.len()).filter(is_alike).min_by(fewest).unwrap_or(best);
+    Some((named, with_mirror_image(tried, named, robot, limits)))
+}
+
+/// How many joints it is about, where fewer may fit alike.
+fn joints(kind: &MistakeKind) -> Option<usize> {
+    match kind {
+        MistakeKind::Signs(joints) | MistakeKind::Columns(joints) => Some(joints.len()),
+        _ => None,
+    }
+}
+
+/// The mistake with what fits alike as the mirror image of the arm, where that was tried.
+fn with_mirror_image(tried: &[Explained], named: usize, robot: &Robot, limits: &Limits) -> MistakeKind {
+    let (left, kind) = &tried[named];
+    let mirrors = mirror_images(&robot.chain, limits.suspicious_misfit);
+    let alike =
+        || tried.iter().filter(move |(other, _)| limits.mistake_explains * other <= *left).map(|(_, kind)| kind);
+    let is_alike = |joints: &Vec<String>| alike().any(|kind| *kind == MistakeKind::Signs(joints.clone()));
+    let others = |joints: &[String]| {
+        let others = mirrors.iter().map(|mirror| signs_of_others(robot, joints, mirror));
+        others.filter(|others| !others.is_empty()).find(is_alike)
+    };
+    let with_others = match kind {
+        MistakeKind::Poses { .. } => axes_of(kind).zip(others(&[])),
+        MistakeKind::Signs(joints) => {
+            let is_mirror = mirrors.iter().any(|mirror| signs_of_others(robot, &[], mirror) == *joints);
+            alike().find_map(axes_of).filter(|_| is_mirror).zip(Some(joints.clone()))
+        }
+        _ => None,
+    };
+    match (with_others, kind) {
+        (Some((axes, joints)), _) => MistakeKind::MirrorImage { joints, axes: axes.to_owned() },
+        (None, MistakeKind::Signs(joints)) => others(joints)
+            .map_or_else(|| kind.clone(), |others| MistakeKind::SignsOrMirror { joints: joints.clone(), others }),
+        _ => kind.clone(),
+    }
+}
+
+/// What to do with left-handed axes, where the mistake is these.
+fn axes_of(kind: &MistakeKind) -> Option<&str> {
+    match kind {
+        MistakeKind::Poses { code: Code::AxesMirrored, remedy, .. } => Some(remedy),
+        _ => None,
+    }
+}
