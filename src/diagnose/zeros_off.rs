@@ -12,6 +12,8 @@ pub struct ZeroOff {
     pub joint: String,
     /// What its readings lack, rad or m.
     pub offset: f64,
+    /// False of a joint at an end of the arm, where another zero turns the base, or the hand, alone.
+    pub offset_is_told: bool,
     /// How it moves.
     pub kind: JointKind,
     /// True where it counts the other way.
@@ -19,15 +21,18 @@ pub struct ZeroOff {
 }
 
 pub(super) fn check(fit: &Adjustment, setting: &CheckContext) -> Vec<ZeroOff> {
-    let of = |joint: &Joint| match joint.found {
-        Some(FoundOrigin::Zero { offset, is_reversed })
+    let chain = &fit.state.robot.chain;
+    let is_at_an_end = |reading: usize| reading == 0 || reading + 1 == chain.readings.len();
+    let of = |joint: &Joint| match (joint.found, joint.drive) {
+        (Some(FoundOrigin::Zero { offset, is_reversed }), Some(drive))
             if is_reversed || offset.abs() > setting.limits.zeros_off_rad =>
         {
-            Some(ZeroOff { joint: joint.name.clone(), offset, kind: joint.kind, is_reversed })
+            let offset_is_told = !is_at_an_end(drive.reading);
+            Some(ZeroOff { joint: joint.name.clone(), offset, offset_is_told, kind: joint.kind, is_reversed })
         }
         _ => None,
     };
-    fit.state.robot.chain.joints.iter().filter_map(of).collect()
+    chain.joints.iter().filter_map(of).collect()
 }
 
 impl Kind for ZeroOff {
@@ -42,7 +47,8 @@ impl Kind for ZeroOff {
     fn quantities(&self) -> Vec<Quantity> {
         let unit = if self.kind == JointKind::Prismatic { "m" } else { "rad" };
         let sign = if self.is_reversed { -1.0 } else { 1.0 };
-        vec![Quantity::new("offset", self.offset, unit), Quantity::new("sign", sign, "1")]
+        let offset = self.offset_is_told.then(|| Quantity::new("offset", self.offset, unit));
+        offset.into_iter().chain([Quantity::new("sign", sign, "1")]).collect()
     }
 
     fn place(&self) -> String {
@@ -54,8 +60,16 @@ impl Kind for ZeroOff {
             JointKind::Prismatic => (1e3 * self.offset, "mm"),
             _ => (self.offset.to_degrees(), "deg"),
         };
-        let counts = if self.is_reversed { "counts the other way, and " } else { "" };
-        format!("{counts}its zero is {size:+.1} {unit} from that of the URDF, by the images; the corrected URDF has it")
+        match (self.is_reversed, self.offset_is_told) {
+            (true, true) => format!(
+                "counts the other way, and its zero is {size:+.1} {unit} from that of the URDF, by the images; the corrected URDF has it"
+            ),
+            (false, true) => {
+                format!("its zero is {size:+.1} {unit} from that of the URDF, by the images; the corrected URDF has it")
+            }
+            (true, false) => "counts the other way, by the images, and does so in the corrected URDF; where its zero is they do not tell, as another one turns base or hand alone".into(),
+            (false, false) => "its zero is not that of the URDF; where it is the images do not tell, as another one turns base or hand alone".into(),
+        }
     }
 
     fn remedy(&self) -> String {

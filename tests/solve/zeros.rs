@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use robotcal::assess::{View, predict_pose};
+use robotcal::diagnose::Subject;
 use robotcal::error::Code;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, Solution, identify};
@@ -42,10 +43,16 @@ struct World {
 }
 
 fn world(seed: u64, images: usize) -> World {
+    world_with(seed, images, None)
+}
+
+/// The same with this axis reversed.
+fn world_with(seed: u64, images: usize, reversed: Option<usize>) -> World {
     let mut dice = Dice::new(seed);
     let robot = RobotDescription::from_text(Path::new("hobby.urdf"), URDF.into()).unwrap();
     let nominal = robot.chain(None, None).unwrap();
-    let reversed = (dice.between(0.0, 4.999)) as usize;
+    let drawn = (dice.between(0.0, 4.999)) as usize;
+    let reversed = reversed.unwrap_or(drawn);
     let offsets: Vec<f64> = (0..5).map(|_| dice.between(-LARGEST_ZERO, LARGEST_ZERO)).collect();
     let actual = (0..5).fold(nominal.clone(), |c, r| c.with_zero(r, offsets[r], r == reversed).unwrap());
     let mut truth = Robot::nominal(actual);
@@ -162,6 +169,20 @@ fn the_zeros_of_a_hobby_arm_and_the_axis_that_counts_the_other_way_are_found_and
         assert!(is_found(&world, &solution));
         assert!(solution.findings.iter().any(|f| f.code() == Code::ZeroOff));
         assert!(actual < 2.0 * stated, "{actual} {stated}");
+    }
+}
+
+/// Another zero of the first joint turns the base alone, one of the last joint the hand.
+#[test]
+fn the_zero_of_a_joint_at_an_end_of_the_arm_is_not_told() {
+    for reversed in [0, 4] {
+        let world = world_with(3, 40, Some(reversed));
+        let solution =
+            identify(world.nominal.clone(), std::slice::from_ref(&world.series), &Options::default()).unwrap();
+        let joint = Subject::Joint(world.nominal.readings[reversed].clone());
+        let found = solution.findings.iter().find(|f| f.code() == Code::ZeroOff && f.subjects().contains(&joint));
+        let names: Vec<String> = found.unwrap().quantities().into_iter().map(|q| q.name).collect();
+        assert_eq!(names, ["sign"], "{reversed}");
     }
 }
 
