@@ -99,11 +99,14 @@ impl Moved {
             }
             false => (format!("in series {}", own.name), format!("give series {}", own.name)),
         };
+        let target = &problem.bodies[first.body];
         let (code, what, remedy) = match self.is_body {
             true => (
                 Code::TargetDisplaced,
-                format!("{from} the target on the tip sits {:.0} mm elsewhere", 1e3 * self.distance_m),
-                format!("give the target another name {from}, or measure again"),
+                format!("{from} the target {target} on the tip sits {:.0} mm elsewhere", 1e3 * self.distance_m),
+                format!(
+                    "see that the names of two targets are not exchanged {from}; else give {target} another name {from}, or measure again"
+                ),
             ),
             false => (
                 Code::TrackerDisplaced,
