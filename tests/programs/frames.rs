@@ -14,6 +14,7 @@ use robotcal::geom::Pose;
 use robotcal::identify::touch_mistake;
 use robotcal::model::inverse::{reading_limits, solve_from};
 use robotcal::model::robot::Robot;
+use robotcal::output::frame_findings::frame_findings;
 use robotcal::output::frames_record::{self, ToolKind};
 use robotcal::output::restore::found_model;
 use robotcal::output::solution_json;
@@ -631,6 +632,11 @@ fn usual_mistakes_in_touches_are_named() {
     is(named(&rows), Code::RowsShifted, "row below");
     let sign = |touches: &mut Touches| touches.postures.iter_mut().for_each(|p| p.readings[3] *= -1.0);
     is(named(&sign), Code::JointSignWrong, "joint_a4");
+    // As found the arm is no mirror image of itself: its errors tell the joints from the axes.
+    let mirrored = |touches: &mut Touches| {
+        touches.postures.iter_mut().for_each(|p| [0, 3, 5].iter().for_each(|&k: &usize| p.readings[k] *= -1.0));
+    };
+    is(named(&mirrored), Code::JointSignWrong, "joint_a6");
     is(named(&|t| places(t, 0..16, &|p| p.y = -p.y)), Code::AxesMirrored, "left-handed");
     for (metres, name) in [(0.0254, "inches"), (0.3048, "feet")] {
         is(named(&|t| places(t, 0..16, &|p| *p /= metres)), Code::MeasuredUnit, name);
@@ -665,6 +671,34 @@ fn usual_mistakes_in_touches_are_named() {
     let near = fit(&robot, &good, &Given { tool: Some(Pose::new(Matrix3::identity(), tool)), plate: None }, &limits);
     assert!(near.unwrap().robot_sigmas > limits.sigmas_beyond_tolerance);
     assert!(fit(&robot, &good, &Given { tool: None, plate: None }, &limits).unwrap().robot_sigmas < 4.0);
+}
+
+/// Touches of one place that are left out together: the place is wrong.
+#[test]
+fn a_place_whose_touches_are_all_left_out_is_doubted() {
+    let World { robot, truth } = world();
+    let toucher = Toucher { truth: &truth, work: work(), tool: TOOL.into(), sigma_m: 5e-5, joint_sigma: 2e-5 };
+    let (given, limits) = (Given { tool: None, plate: None }, Limits::default());
+    let mut rng = rng(33);
+    let mut touches = toucher.places(&spread(&ranges(&robot.stops), 24, &mut rng), "fixture", &mut rng);
+    // The same place twice, and typed wrongly.
+    touches.postures[1].readings = touches.postures[0].readings.clone();
+    touches.all[1].seen = touches.all[0].seen;
+    let doubted = |touches: &Touches| {
+        let found = fit(&robot, touches, &given, &limits).unwrap();
+        let all = frame_findings((&found, None), touches, &limits, "touches");
+        let of_place = all.into_iter().find(|f| f.code == Code::PlaceContradicted);
+        of_place.map(|f| (f.weight, f.quantities["touches"], f.quantities["missed_mm"]))
+    };
+    assert_eq!(doubted(&touches), None);
+    for touch in &mut touches.all[..2] {
+        if let Seen::Point(place) = &mut touch.seen {
+            place.x += 3e-3;
+        }
+    }
+    let (weight, count, missed_mm) = doubted(&touches).unwrap();
+    assert_eq!((weight, count), (Weight::Note, 2.0));
+    assert!((missed_mm - 3.0).abs() < 0.3, "{missed_mm}");
 }
 
 /// Four places and six unknowns: a place that is wrong can be another one as well.

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, Weight};
 use crate::error::Code;
-use crate::frames::{FrameFit, Touches};
+use crate::frames::{FrameFit, Seen, Touches};
 use crate::geom::{Pose, adjoint};
 use crate::output::corrections::{FileFinding, numbers};
 
@@ -47,6 +47,7 @@ pub fn frame_findings(
         let share = left_out.len() as f64 / touches.all.len() as f64;
         let weight = if share > limits.share_of_images_left_out { Weight::Gate } else { Weight::Note };
         all.push(finding(Code::TouchesLeftOut, weight, numbers([("touches", left_out.len() as f64)]), text));
+        all.extend(places_left_out(fit, touches, subject));
     }
     if fit.factor > limits.touch_factor {
         let text = format!(
@@ -96,6 +97,39 @@ pub fn frame_findings(
         all.extend(weak("the turn of the work object about an axis", &turn, spread, " at the places"));
     }
     all
+}
+
+/// Places of which every touch, of two and more, is left out: these agree with each other, so that the place is rather wrong than each of them.
+fn places_left_out(fit: &FrameFit, touches: &Touches, subject: &str) -> Vec<FileFinding> {
+    let mut places: Vec<(Vector3<f64>, Vec<usize>)> = Vec::new();
+    for (k, touch) in touches.all.iter().enumerate() {
+        let Seen::Point(place) = touch.seen else { continue };
+        match places.iter_mut().find(|(other, _)| *other == place) {
+            Some((_, own)) => own.push(k),
+            None => places.push((place, vec![k])),
+        }
+    }
+    places.retain(|(_, own)| own.len() > 1 && own.iter().all(|&k| fit.judged[k].left_out));
+    let finding = |(place, own): (Vector3<f64>, Vec<usize>)| {
+        let missed: Vector3<f64> = own.iter().map(|&k| fit.judged[k].residual_m).sum();
+        let missed_mm = 1e3 * (missed / own.len() as f64).norm();
+        let stops: Vec<&str> = own.iter().map(|&k| touches.all[k].stop.as_str()).collect();
+        let text = format!(
+            "all touches of the place ({:.4}, {:.4}, {:.4}) m are left out ({}), {missed_mm:.2} mm away in their mean: it may be this place that is wrong; correct it in contacts.csv, or touch the point that was meant",
+            place.x,
+            place.y,
+            place.z,
+            stops.join(", ")
+        );
+        FileFinding {
+            code: Code::PlaceContradicted,
+            weight: Weight::Note,
+            subject: subject.to_owned(),
+            quantities: numbers([("missed_mm", missed_mm), ("touches", own.len() as f64)]),
+            text,
+        }
+    };
+    places.into_iter().map(finding).collect()
 }
 
 /// Covariance of a work object (body twist) in the middle of the places, and how far these reach from it, m RMS.
