@@ -367,7 +367,7 @@ codes! {
         TouchesLeftOut "touches_left_out" "touches disagree with the others, and are left out",
         ReadingsOfOtherZeros "readings_of_other_zeros" "touches fit with their readings taken on the other side of the mastering",
         TouchesScatter "touches_scatter" "touches scatter more than their stated sigma says",
-        TouchesExact "touches_exact" "touches fit far better than their stated sigma lets them: they were computed, not made",
+        TouchesExact "touches_exact" "touches have the joint values of their plan, or fit far better than their stated sigma lets them: they were computed, not made",
         RobotContradicted "robot_contradicted" "touches say of the robot what the solution excludes",
         ToolContradicted "tool_contradicted" "the tool that was given is not where the touches have it",
         PlaceContradicted "place_contradicted" "a place that was touched is not where the other touches have it",

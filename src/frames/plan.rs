@@ -17,7 +17,7 @@ use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::linalg::{SymmetricFactor, product};
-use crate::model::inverse::{reading_limits, solve_from};
+use crate::model::inverse::{Reach, reading_limits, solve_from};
 use crate::model::robot::Posture;
 
 /// What is known of tool and work object before: 0.1 m and 0.1 rad, so that nearly nothing is.
@@ -194,26 +194,43 @@ impl Search<'_> {
                 break;
             }
         }
-        // Once more in the order in which they help.
-        let members: Vec<&Candidate> = set.iter().map(|&k| &candidates[k]).collect();
-        let mut order: Vec<usize> = Vec::new();
-        let mut planned = Vec::with_capacity(set.len());
-        while order.len() < set.len() {
-            let inverse = self.inverse_of(order.iter().map(|&k| members[k]), &information)?;
-            let pull = product(&product(&inverse, &q), &inverse);
-            let left = (0..members.len()).filter(|k| !order.contains(k));
-            let next =
-                left.max_by(|&a, &b| gain(members[a], &inverse, &pull).total_cmp(&gain(members[b], &inverse, &pull)))?;
-            order.push(next);
-            let inverse = self.inverse_of(order.iter().map(|&k| members[k]), &information)?;
-            let expected_m = inverse.component_mul(&q).sum().max(0.0).sqrt();
-            planned.push(PlannedTouch {
-                point: members[next].point,
-                readings: members[next].readings.clone(),
-                expected_m,
-            });
+        self.in_order(set.iter().map(|&k| &candidates[k]).collect(), &information, &q)
+    }
+
+    /// Touches in the order in which they help, each reached from the one before it, as [`super::Touches`] takes the rows of a series.
+    fn in_order(
+        &self,
+        mut left: Vec<&Candidate>,
+        before: &DMatrix<f64>,
+        q: &DMatrix<f64>,
+    ) -> Option<Vec<PlannedTouch>> {
+        let mut placed: Vec<Candidate> = Vec::with_capacity(left.len());
+        let mut planned = Vec::with_capacity(left.len());
+        while !left.is_empty() {
+            let inverse = self.inverse_of(placed.iter(), before)?;
+            let pull = product(&product(&inverse, q), &inverse);
+            let gain = |k: &usize| gain(left[*k], &inverse, &pull);
+            let next = (0..left.len()).max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
+            placed.push(self.reached_after(left.remove(next), placed.last()));
+            let inverse = self.inverse_of(placed.iter(), before)?;
+            let expected_m = inverse.component_mul(q).sum().max(0.0).sqrt();
+            let Candidate { point, readings, .. } = placed.last()?;
+            planned.push(PlannedTouch { point: *point, readings: readings.clone(), expected_m });
         }
         Some(planned)
+    }
+
+    /// A touch whose joints come from those of another: backlash is on the side from which they come.
+    fn reached_after(&self, touch: &Candidate, before: Option<&Candidate>) -> Candidate {
+        let exported = self.robot.exported();
+        let limits = reading_limits(&exported.chain);
+        let previous = before.map(|b| b.readings.as_slice());
+        let reach = Reach { robot: exported, limits: &limits, held: &[], previous };
+        let wanted = self.robot.at(&Posture::at(&touch.readings)).0;
+        // A joint at its limit cannot give way to the backlash.
+        let readings = reach.solve_from(&wanted, &touch.readings).unwrap_or_else(|_| touch.readings.clone());
+        let (j, v) = self.rows(&reach.stop(&readings), &Seen::Point(self.request.points[touch.point].1));
+        Candidate { point: touch.point, readings, j, v }
     }
 
     fn inverse(&self, candidates: &[Candidate], set: &[usize], before: &DMatrix<f64>) -> Option<DMatrix<f64>> {

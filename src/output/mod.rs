@@ -33,7 +33,7 @@ pub use drawing::{overlay, plate_drawing};
 pub use frames::{frame_files, frame_findings, frames_record, work_findings};
 pub use judgement::{comparison, corrections, difference, parameter_words, verdict};
 pub use names::folder_name;
-pub use plan::{plan_files, plan_programs, plan_start};
+pub use plan::{plan_files, plan_programs, plan_start, touch_plan};
 #[cfg(feature = "report")]
 pub use report::{
     FILE_NAME as REPORT, FigureFile, Shown, Thumbnail, Thumbnails, figure_files, plan_html, report_html, sigma_text,

@@ -534,6 +534,60 @@ fn planned_touches_are_a_series_that_frames_reads() {
     assert_says(&robotcal(&plan, &out).expect(3).said(), Code::PlanOutOfReach, &["b", "c"]);
 }
 
+/// With backlash a plan and `frames` take every joint from the same side: what nobody jogged fits as exactly as of a rigid robot (it missed by
+/// 0.1 mm and looked like touches), and rows of a plan are known by their joint values.
+#[test]
+fn planned_joints_of_a_robot_with_backlash_are_no_touches() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let [kr6, series, report, points, touches] =
+        [repo(KR6).to_str().unwrap().to_owned(), at("series"), at("report"), at("fixture.csv"), at("touches")];
+    let run = |args: &[&str], out: &str| robotcal(args, Path::new(out));
+    let simulate = ["simulate", "--urdf", &kr6, "--errors", "full", "--images", "30", "--seed", "5", "--observations"];
+    run(&simulate, &series).expect(0);
+    run(&["identify", "--urdf", &kr6, "--series", &series, "--robot-model", "full"], &report).expect(0);
+    std::fs::write(&points, "name,x_m,y_m,z_m\np1,0,0,0\np2,0.15,0,0\np3,0.15,0.1,0\np4,0,0.1,0.03\n").unwrap();
+    let solution = at("report/solution.json");
+    let place = ["--touch-work", "0.5,0.1,0.1", "--touch-tool", "0,0,0.12", "--count", "12"];
+    run(&[&["plan", "--from", &solution, "--touch", &points][..], &place].concat(), &touches).expect(0);
+    let exact = || {
+        let run = run(&["frames", "--from", &solution, "--touches", &touches], &at("frames")).expect(1);
+        let record = frames_record::read(&run.file("frames.json")).unwrap();
+        let found = record.findings.into_iter().find(|f| f.code == Code::TouchesExact).unwrap();
+        assert_eq!(found.weight, Weight::Gate);
+        println!("{:?}", found.quantities);
+        found.quantities
+    };
+    let as_planned = exact();
+    assert_eq!((as_planned["as_planned"], as_planned["freedom"]), (12.0, 27.0));
+    assert!(as_planned["size"] < 0.05, "{as_planned:?}");
+    // Nine of twelve were jogged to, 0.05 mrad a joint beside the plan.
+    let table = Path::new(&touches).join("joints.csv");
+    let rows = std::fs::read_to_string(&table).unwrap();
+    let mut noise = rng(1);
+    let jogged = rows.lines().enumerate().map(|(k, row)| {
+        let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+        if (1..10).contains(&k) {
+            for cell in &mut cells[1..] {
+                let beside = spread(&[(-0.005, 0.005)], 1, &mut noise)[0][0];
+                *cell = format!("{:.4}", cell.parse::<f64>().unwrap() + beside);
+            }
+        }
+        cells.join(",") + "\n"
+    });
+    let jogged: String = jogged.collect();
+    std::fs::write(&table, jogged).unwrap();
+    let some = exact();
+    assert_eq!(some["as_planned"], 3.0);
+    assert!(some["size"] > 0.1, "{some:?}");
+    // Without its record the plan is known by how exactly it fits.
+    std::fs::write(&table, rows).unwrap();
+    std::fs::remove_file(Path::new(&touches).join("plan.json")).unwrap();
+    let unrecorded = exact();
+    assert_eq!(unrecorded["as_planned"], 0.0);
+    assert!(unrecorded["size"] < 0.05, "{unrecorded:?}");
+}
+
 /// A taught program on another robot: the common work object is named, and the tool comes to the same place of it.
 #[test]
 fn a_taught_program_is_moved_by_a_common_work_object() {

@@ -359,7 +359,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
 ];
 
 /// Files whose constants are sizes of drawings, tables and lines of the terminal.
-const SHOWN: [&str; 10] = [
+const SHOWN: [&str; 11] = [
     "output/report/",
     "cli/results/at.rs",
     "cli/corrected_robot/compensate.rs",
@@ -369,6 +369,7 @@ const SHOWN: [&str; 10] = [
     "cli/images/poses.rs",
     "cli/results/summary.rs",
     "cli/corrected_robot/frames.rs MOST_ROWS",
+    "cli/corrected_robot/frames.rs MOST_STOPS",
     "cli/series/plan.rs GAINS_SHOWN",
 ];
 

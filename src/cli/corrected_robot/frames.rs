@@ -28,7 +28,7 @@ use crate::output::frames_record::{
 use crate::output::restore::{FoundModel, chain, exported_model, robot_description};
 use crate::output::solution_json::SolutionRecord;
 use crate::output::work_findings::{from_below, other_frame};
-use crate::output::{ResultFolder, folder_name};
+use crate::output::{ResultFolder, folder_name, touch_plan};
 use crate::problem::MeasuredSeries;
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{RobotDescription, patch_origins};
@@ -69,6 +69,8 @@ struct Measured {
     touches: Touches,
     files: Vec<InputFile>,
     notices: Vec<Notice>,
+    /// Stops with the joint values of a plan.
+    as_planned: Vec<String>,
 }
 
 pub fn run(args: &FramesArgs) -> Result<Verdict> {
@@ -76,7 +78,7 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     let record = read_solution(&args.from)?;
     let description = robot_description(&record)?;
     let found = exported_model(&record)?;
-    let Measured { mut touches, files, notices } = read_touches(args, &record, &description)?;
+    let Measured { mut touches, files, notices, as_planned } = read_touches(args, &record, &description)?;
     let zeros = args.readings.of(&record, &files)?.filter(|_| !touches.all.is_empty());
     zeros.iter().for_each(|zeros| touches.add(&zeros.missing));
     let placement = args.plate.as_ref().map(|name| placement_named(&record, name)).transpose()?;
@@ -96,7 +98,9 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     }
     let subject = args.touches.first().unwrap_or(&args.from).display().to_string();
     let mistake = touch_mistake(&robot, &touches, &given, (&fitted, &found.limits));
+    let is_explained = mistake.is_some();
     let mut findings = findings((&fitted, mistake), &touches, (&found.limits, placement), &subject);
+    findings.extend(computed((&fitted, is_explained), &as_planned, &found.limits, &subject));
     findings.extend(other_frame(&record.robot.base, (&fitted, &work_name(&touches)), &found.limits, &subject));
     findings.extend(
         zeros.as_ref().and_then(|z| other_zeros((&fitted, z), (&robot, &touches, &given), &found.limits, &subject)),
@@ -166,7 +170,6 @@ fn findings(
     let mut all = frame_findings((&by_use, mistake), touches, limits, subject);
     if !is_explained {
         all.extend(placement.and_then(|_| plate_weak(fit, touches, limits, subject)));
-        all.extend(too_exact(fit, limits, subject));
     }
     all
 }
@@ -201,17 +204,39 @@ fn plate_weak(fit: &FrameFit, touches: &Touches, limits: &Limits, subject: &str)
     is_weak.then(|| gate(Code::FrameWeak, subject, numbers([("sigma_mm", sigma_mm)]), text))
 }
 
-/// Touches as exact as only computed ones are: those of a plan, with the joint values that it proposed.
-fn too_exact(fit: &FrameFit, limits: &Limits, subject: &str) -> Option<FileFinding> {
+/// Stops that are named.
+const MOST_STOPS: usize = 5;
+
+/// Touches that nobody made: with the joint values of a plan, or as exact as only computed ones are.
+fn computed(
+    (fit, is_explained): (&FrameFit, bool),
+    as_planned: &[String],
+    limits: &Limits,
+    subject: &str,
+) -> Option<FileFinding> {
     let AsStated { size, freedom } = fit.as_stated;
-    let text = format!(
-        "the touches fit {:.0} times better than their stated sigma and the joint noise let them ({:.4} mm RMS, {freedom} degrees of freedom): these are the joint values of a plan, or computed ones, not those at which the tool touched; write these into joints.csv (or correct sigma_m, if it is so much too large)",
-        1.0 / size.max(f64::MIN_POSITIVE),
-        1e3 * fit.rms_m
-    );
-    let quantities = numbers([("size", size), ("freedom", freedom as f64), ("rms_mm", 1e3 * fit.rms_m)]);
-    let is_exact = freedom >= limits.exact_touches_freedom && size < limits.exact_touches;
-    is_exact.then(|| gate(Code::TouchesExact, subject, quantities, text))
+    let is_exact = !is_explained && freedom >= limits.exact_touches_freedom && size < limits.exact_touches;
+    let what = if as_planned.is_empty() {
+        format!(
+            "the touches fit {:.0} times better than their stated sigma and the joint noise let them ({:.4} mm RMS, {freedom} degrees of freedom): these are the joint values of a plan, or computed ones, not those at which the tool touched; write these into joints.csv (or correct sigma_m, if it is so much too large)",
+            1.0 / size.max(f64::MIN_POSITIVE),
+            1e3 * fit.rms_m
+        )
+    } else {
+        format!(
+            "{} of the stops have the joint values of plan.json to the last digit ({}{}): nobody jogged there; write those at which the tool touched into joints.csv, or take these rows out",
+            as_planned.len(),
+            as_planned.iter().take(MOST_STOPS).cloned().collect::<Vec<_>>().join(", "),
+            if as_planned.len() > MOST_STOPS { ", .." } else { "" }
+        )
+    };
+    let quantities = numbers([
+        ("size", size),
+        ("freedom", freedom as f64),
+        ("rms_mm", 1e3 * fit.rms_m),
+        ("as_planned", as_planned.len() as f64),
+    ]);
+    (is_exact || !as_planned.is_empty()).then(|| gate(Code::TouchesExact, subject, quantities, what))
 }
 
 fn gate(code: Code, subject: &str, quantities: BTreeMap<String, f64>, text: String) -> FileFinding {
@@ -226,10 +251,16 @@ fn named(error: Error, args: &FramesArgs) -> Error {
 
 fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotDescription) -> Result<Measured> {
     if args.touches.is_empty() {
-        return Ok(Measured { touches: Touches::default(), files: Vec::new(), notices: Vec::new() });
+        return Ok(Measured {
+            touches: Touches::default(),
+            files: Vec::new(),
+            notices: Vec::new(),
+            as_planned: Vec::new(),
+        });
     }
     let chain = chain(record, description, &record.robot.base, &record.robot.tip)?;
-    let (mut all, mut files, mut notices): (Vec<MeasuredSeries>, _, _) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut all, mut files, mut notices, mut as_planned): (Vec<MeasuredSeries>, Vec<_>, Vec<_>, Vec<_>) =
+        Default::default();
     for folder in &args.touches {
         holds_touches(folder)?;
         let s = series::read(folder)?;
@@ -237,9 +268,17 @@ fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotD
         let measured = measure_bodies(&s, &chain, false)?;
         files.extend(s.inputs);
         notices.extend(measured.notices);
+        as_planned.extend(touch_plan::as_planned(folder, &chain, touched(&measured.series))?);
         all.push(measured.series);
     }
-    Ok(Measured { touches: Touches::of(&all)?, files, notices })
+    Ok(Measured { touches: Touches::of(&all)?, files, notices, as_planned })
+}
+
+/// Stops at which something was touched, with their readings.
+fn touched(series: &MeasuredSeries) -> impl Iterator<Item = (&str, &[f64])> {
+    let is_touched = |k: usize| series.bodies.iter().any(|b| b.stop == k);
+    let stops = series.stops.iter().enumerate().filter(move |(k, _)| is_touched(*k));
+    stops.filter_map(|(_, stop)| Some((stop.image.as_str(), stop.readings.as_deref()?)))
 }
 
 /// A folder that has none of the files is another one than was meant.

@@ -17,6 +17,7 @@ use crate::frames::{KnownRobot, PlannedTouch, TouchPlan, TouchRequest, plan_touc
 use crate::geom::Pose;
 use crate::model::robot::Posture;
 use crate::output::restore::{entered_offsets, exported_model};
+use crate::output::touch_plan::{TouchStop, touch_files};
 use crate::output::{ResultFolder, plan_files};
 use crate::series::{AngleUnit, CameraMount, ContactSection, Manifest, Row, Table};
 use crate::urdf::{Chain, JointKind};
@@ -92,7 +93,10 @@ pub(super) fn run(
         ("contacts.csv", contacts(&planned, &request)),
     ];
     let files = files.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    place.write_all(&plan_files::touch_files(files.into(), &crate::cli::command_line().join(" "))?)?;
+    let stops: Vec<TouchStop> =
+        planned.iter().enumerate().map(|(k, t)| TouchStop { stop: stop(k), readings: t.readings.clone() }).collect();
+    let command = crate::cli::command_line().join(" ");
+    place.write_all(&touch_files(files.into(), (&chain.readings, &stops), &command)?)?;
     say!("{}", text(&planned, (&request, fewest), &robot, out));
     if entered_offsets(&record)?.iter().any(|offset| *offset != 0.0) {
         say_line!("readings  the joint values are those of the controller with the offsets of mastering.csv entered");

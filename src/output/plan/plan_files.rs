@@ -14,7 +14,7 @@ use crate::urdf::JointKind;
 pub const FILE_NAME: &str = "plan.json";
 
 /// Version of plan.json.
-const FORMAT: u32 = 1;
+pub(super) const FORMAT: u32 = 1;
 
 /// Digits after the point of a reading in degrees: finer than any controller shows.
 const DEGREE_DIGITS: f64 = 1e4;
@@ -121,25 +121,6 @@ pub fn plan_files(
         files.insert("plate.csv".into(), plate_csv(&setting.plate).into_bytes());
     }
     let record = record(request, plan, forecast, command, &files);
-    files.insert(FILE_NAME.to_owned(), json(&record, FILE_NAME)?);
-    Ok(files)
-}
-
-#[derive(Serialize)]
-struct TouchRecord<'a> {
-    format: u32,
-    files: Vec<String>,
-    as_written: BTreeMap<String, String>,
-    command: &'a str,
-}
-
-/// The files of planned touches with their record.
-///
-/// # Errors
-/// None in practice: everything can be written as text.
-pub fn touch_files(mut files: BTreeMap<String, Vec<u8>>, command: &str) -> Result<BTreeMap<String, Vec<u8>>> {
-    let listed = files.keys().cloned().chain([FILE_NAME.to_owned()]).collect();
-    let record = TouchRecord { format: FORMAT, files: listed, as_written: as_written(&files), command };
     files.insert(FILE_NAME.to_owned(), json(&record, FILE_NAME)?);
     Ok(files)
 }
