@@ -186,6 +186,11 @@ fn readings_to_a_mastered_robot_are_taken_one_way_for_all_folders() {
     assert_eq!(verdict(&report, &series, &["--readings", "after"]).0, Some(2));
     let other = verdict(&report, &series, &[]).0;
     assert!(other != Some(2), "{other:?}");
+    // Nor where the plate of the solution is the work object and nothing was touched.
+    let [solution, frames] = ["result/solution.json", "frames"].map(|p| folder.path().join(p).display().to_string());
+    let plate = ["frames", "--from", &solution, "--plate", "--out", &frames];
+    assert_ne!(robotcal(&plate).status.code(), Some(2));
+    assert_eq!(robotcal(&[&plate[..], &["--readings", "after"]].concat()).status.code(), Some(2));
 }
 
 #[test]

@@ -79,13 +79,13 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     let description = robot_description(&record)?;
     let found = exported_model(&record)?;
     let Measured { mut touches, files, notices, as_planned } = read_touches(args, &record, &description)?;
-    let zeros = args.readings.of(&record, &files)?.filter(|_| !touches.all.is_empty());
+    let nothing = touches.all.is_empty();
+    let zeros = if nothing { args.readings.of_none()? } else { args.readings.of(&record, &files)? };
     zeros.iter().for_each(|zeros| touches.add(&zeros.missing));
     let placement = args.plate.as_ref().map(|name| placement_named(&record, name)).transpose()?;
     let robot = found.known_robot(placement)?;
     let plate = placement.map(|p| Pose::from(&record.placements[p].pose));
     let tool = known_tool(args)?;
-    let nothing = touches.all.is_empty();
     if nothing {
         touches.bodies.push(args.tool_name.clone());
         touches.frame = placement.map(|p| record.placements[p].name.clone());

@@ -57,6 +57,17 @@ impl ReadingsArgs {
         }
     }
 
+    /// Where no joint values are read.
+    ///
+    /// # Errors
+    /// The flag.
+    pub(super) fn of_none(self) -> Result<Option<Zeros>> {
+        self.readings.map_or(Ok(None), |_| {
+            let (what, remedy) = ("no joint values are read here", "leave the flag out, or give touches");
+            Err(Error::new(Code::OptionConflict, "--readings", what, remedy))
+        })
+    }
+
     /// How readings to a solution are taken that came with some files; nothing where the exported robot takes the readings of the identification.
     ///
     /// # Errors

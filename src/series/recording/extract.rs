@@ -71,7 +71,6 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         posture.positions.iter_mut().zip(&factors).for_each(|(q, factor)| *q *= factor);
     }
     require_overlap(&scan, &postures, &times)?;
-    scan.notices.extend(silence::notices(recording, &samples, &joints, &times));
     let image_delay_s = scan.delay_s(std::slice::from_ref(&image_topic)) - scan.delay_s(&topics);
     let guess = match options.clock {
         Clock::Stamp => Guess::of_arrival(-image_delay_s),
@@ -92,6 +91,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let open = if is_open { nanoseconds(-image_delay_s) } else { 0 };
     let still_speeds: Vec<f64> = factors.iter().map(|factor| options.still_speed / factor).collect();
     let later = (later_ns + open.min(0), later_ns + open.max(0));
+    scan.notices.extend(silence::notices(recording, &samples, &joints, (&times, later)));
     scan.notices.extend(Gaps::of(&samples, &joints, &still_speeds).leave_out(recording, begin_ns, later, &mut times));
     let late = told.late();
     scan.notices.extend(late.map(|d| d.notice(recording)));

@@ -31,12 +31,18 @@ fn silences<'a>(samples: &[JointSample], joints: &'a [String]) -> BTreeMap<Span,
     silent
 }
 
-/// Says which joints fell silent while so many of the images were taken.
-pub(super) fn notices(recording: &Path, samples: &[JointSample], joints: &[String], images: &[i64]) -> Vec<Notice> {
+/// Says which joints fell silent while so many of the images were taken, where joints are later by `later_ns` (at least, at most) in the time
+/// of the images.
+pub(super) fn notices(
+    recording: &Path,
+    samples: &[JointSample],
+    joints: &[String],
+    (images, later_ns): (&[i64], Span),
+) -> Vec<Notice> {
     let begin = samples.iter().map(|s| s.time_ns).min().unwrap_or_default();
     let seconds = |ns: i64| ns.saturating_sub(begin) as f64 * 1e-9;
     let lost = silences(samples, joints).into_iter().filter_map(|((from, to), silent)| {
-        let lost = images.iter().filter(|t| (from..to).contains(t)).count();
+        let lost = images.iter().filter(|t| (from + later_ns.0..to + later_ns.1).contains(t)).count();
         let what = format!(
             "no readings of {} from {:.1} s to {:.1} s after the first joint state: {lost} images of that time are not used",
             silent.join(", "),
@@ -179,10 +185,14 @@ mod tests {
         let silent = silences(&samples, &joints);
         assert_eq!(silent, BTreeMap::from([((39 * SECOND / 10, 99 * SECOND / 10), vec!["b"])]));
         let images: Vec<i64> = (0..12).map(|s| s * SECOND).collect();
-        let told = notices(Path::new("run.mcap"), &samples, &joints, &images);
+        let told = notices(Path::new("run.mcap"), &samples, &joints, (&images, (0, 0)));
         assert_eq!(told.iter().map(|n| n.code).collect::<Vec<_>>(), [Code::JointSilent]);
         assert!(told[0].what.contains("6 images"), "{told:?}");
-        assert_eq!(notices(Path::new("run.mcap"), &samples, &joints, &images[..4]), []);
+        assert_eq!(notices(Path::new("run.mcap"), &samples, &joints, (&images[..4], (0, 0))), []);
+        // A second earlier in the time of the images.
+        let earlier = (-SECOND, -SECOND);
+        assert_eq!(notices(Path::new("run.mcap"), &samples, &joints, (&images[..4], earlier)).len(), 1);
+        assert_eq!(notices(Path::new("run.mcap"), &samples, &joints, (&images[9..], earlier)), []);
     }
     /// "b" is not read for a third of a second while an image is taken; half a second later nothing is recorded at all.
     #[test]
