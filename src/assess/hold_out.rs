@@ -56,7 +56,7 @@ const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 const NOMINAL_POSE_ERROR: f64 = 3e-3;
 
 /// Stops of a series that is held out; of more, so many take part. What they leave open of the model is small beside what scatters from stop to stop.
-const MOST_STOPS: usize = 2000;
+pub(super) const MOST_STOPS: usize = 2000;
 
 /// Predicts every image on the robot by models that have not seen it: of what is calibrated by `fitted`, from the images that are left, which is
 /// [`refitted_near`] for the joint fit. Also returns the errors of what is calibrated.

@@ -3,6 +3,7 @@
 mod advice;
 mod alone;
 mod clustered;
+mod expected_errors;
 mod flange;
 mod hold_out;
 mod hold_out_bodies;
@@ -29,6 +30,7 @@ mod used_stops;
 pub use advice::Advice;
 pub use alone::urdf_alone;
 pub use clustered::{Clustered, RootInformation, StopInformation, clustered_covariance};
+pub use expected_errors::expected_mm;
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
 pub use hold_out::{
     Accuracy, Errors, ImageError, Refit, cluster_of_images, error_of_predicted, folds, hold_out, hold_out_images,

@@ -135,7 +135,7 @@ fn the_verdict_follows_the_gates_and_then_the_doubts() {
     record.notices.push(Notice::new(Code::StandstillWithoutImage, "run1", "", ""));
     assert_eq!(Verdict::of(&record).trust, Trust::Doubts);
     record = good.clone();
-    let odd = OddImage { image: good.images[0].name.clone(), error_mm: 1.25, rms_mm: 0.125 };
+    let odd = OddImage { image: good.images[0].name.clone(), error_mm: 1.25, rms_mm: 0.125, expected_mm: Some(0.25) };
     let gain = SmallGain { calibrated_mm: 0.25, nominal_mm: 0.3125 };
     for doubt in [Finding::from(odd), Finding::from(gain)] {
         record.notices = vec![doubt.notice()];

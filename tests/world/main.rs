@@ -7,6 +7,7 @@ mod bad;
 mod commands;
 mod crossover;
 mod golden;
+mod odd_image;
 mod poses_report;
 #[path = "../support/command.rs"]
 mod program;
