@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use super::rail::{OR_THE_RAIL, is_on_rail, with_gears_released};
-use crate::assess::Accuracy;
+use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem, SCALE, State, UNKNOWN_SCALE, seen_markers, size_by_distance};
@@ -68,10 +68,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
         {
             doubts.push(DoubtedSize::Contradicted { measured, off: told.off, sigma: told.sigma, weight, on_rail });
         }
-        if plate.scale.is_none()
-            && let Some((off, tolerance)) = x_y_scale(problem, state, k)
-            && off.abs() > limits.plate_aspect_sigmas * tolerance
-        {
+        if let Some((off, tolerance)) = uneven(&fit.adjustment, k, limits) {
             let along = told.or_else(|| released.fitted()).map(|told| {
                 let sigma = told.sigma.hypot(0.5 * tolerance);
                 [0.5 * off, -0.5 * off].map(|half| (told.off + half, sigma))
@@ -80,6 +77,18 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
         }
     }
     doubts
+}
+
+/// Plates whose rows and columns differ in scale, as images alone say: their shape needs no robot.
+pub fn uneven_plates(adjustment: &Adjustment, limits: &Limits) -> Vec<DoubtedSize> {
+    let all = (0..adjustment.problem.plates.len()).filter_map(|k| uneven(adjustment, k, limits));
+    all.map(|(off, tolerance)| DoubtedSize::Uneven { off, tolerance, along: None, on_rail: false }).collect()
+}
+
+/// The x/y scale of a plate whose size was not measured and its prior sigma, where it is far beyond that.
+fn uneven(Adjustment { problem, state }: &Adjustment, plate: usize, limits: &Limits) -> Option<(f64, f64)> {
+    let told = x_y_scale(problem, state, plate).filter(|_| problem.plates[plate].scale.is_none());
+    told.filter(|(off, tolerance)| off.abs() > limits.plate_aspect_sigmas * tolerance)
 }
 
 impl DoubtedSize {
@@ -137,7 +146,7 @@ impl Kind for DoubtedSize {
                 if *measured { "[scale]" } else { "its file" },
             ),
             Self::Uneven { off, along, .. } => format!(
-                "its rows and columns differ in scale by {:.2} %{}, so it was not made to size, and all lengths of the robot hang on its size",
+                "its rows and columns differ in scale by {:.2} %{}, so it was not made to size, and all lengths hang on its size",
                 100.0 * off.abs(),
                 along.map_or_else(String::new, |[(x, sigma), (y, _)]| format!(
                     " (by the links of the robot it is {:+.2} % along x and {:+.2} % along y, +- {:.2} %)",

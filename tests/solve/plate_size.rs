@@ -3,8 +3,9 @@
 use crate::robots::kr6;
 use nalgebra::Vector3;
 use robotcal::Code;
-use robotcal::diagnose::{DoubtedSize, Finding};
-use robotcal::identify::{Estimator, Options, RobotModel, Solution, identify};
+use robotcal::assess::Limits;
+use robotcal::diagnose::{DoubtedSize, Finding, Weight};
+use robotcal::identify::{Estimator, Options, RobotModel, Solution, identify, stand_alone};
 use robotcal::model::plate_modes::DOT_GAIN;
 use robotcal::problem::{MeasuredSeries, SCALE};
 use robotcal::series::{Plate, PlateKind, ScaleBar};
@@ -23,10 +24,9 @@ fn seen(chain: &Chain) -> (MeasuredSeries, Vec<[f64; 3]>) {
     (measured(&world, chain), world.truth.marker_errors_m)
 }
 
-/// The solution where the file states a plate larger by these factors along x and y, with a distance measured on the plate as it is.
-fn stated(x: f64, y: f64, bar: Option<(u32, u32)>) -> Solution {
-    let chain = kr6();
-    let (mut series, errors) = seen(&chain);
+/// A series whose file states a plate larger by these factors along x and y, with a distance measured on the plate as it is.
+fn stated_series(x: f64, y: f64, bar: Option<(u32, u32)>) -> MeasuredSeries {
+    let (mut series, errors) = seen(&kr6());
     series.plate.scale = bar.map(|(from, to)| {
         let index = |id| series.plate.index_of(id).unwrap();
         let of = |id| series.plate.markers[index(id)].position_m + Vector3::from(errors[index(id)]);
@@ -35,7 +35,12 @@ fn stated(x: f64, y: f64, bar: Option<(u32, u32)>) -> Solution {
     for m in &mut series.plate.markers {
         (m.position_m.x, m.position_m.y) = (x * m.position_m.x, y * m.position_m.y);
     }
-    identify(chain, &[series], &Options::default()).unwrap()
+    series
+}
+
+/// The solution of it.
+fn stated(x: f64, y: f64, bar: Option<(u32, u32)>) -> Solution {
+    identify(kr6(), &[stated_series(x, y, bar)], &Options::default()).unwrap()
 }
 
 /// What is doubted of the plate, and by how much it is larger than its file says.
@@ -102,6 +107,24 @@ fn a_stretch_is_told_along_its_axis_and_stated_errors_are_without_it() {
         assert!((2e-3..6e-3).contains(&doubt), "{doubt}");
     }
     assert_eq!(stated(1.0, 1.0, None).uncertainty.flange.unwrap().without_size_doubt, None);
+}
+
+/// The shape of a plate shows in images alone, its size does not.
+#[test]
+fn poses_alone_doubt_a_stretched_plate_and_no_other() {
+    let off = |x, y, bar| {
+        let found = stand_alone(&[stated_series(x, y, bar)], &Limits::default()).unwrap();
+        let doubts = found.findings.iter().filter(|f| matches!(f, Finding::DoubtedSize(_)));
+        doubts.map(|f| (f.code(), f.weight(), f.quantities()[0].value)).collect::<Vec<_>>()
+    };
+    for (x, y) in [(1.01, 1.0), (1.0, 1.01)] {
+        let [(code, weight, found)] = off(x, y, None)[..] else { panic!("{x} {y}") };
+        assert_eq!((code, weight), (Code::PlateUneven, Weight::Gate));
+        assert!((found - (1.0 / x - 1.0 / y)).abs() < 1e-3, "{found}");
+    }
+    assert_eq!(off(1.0, 1.0, None), []);
+    assert_eq!(off(1.01, 1.01, None), []);
+    assert_eq!(off(1.01, 1.0, Some((0, 47))), []);
 }
 
 /// The wrist alone turns: its links are short, and say next to nothing of the size of the plate.

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix3x6, Matrix6};
 use super::free_poses::{covariance_together, free_poses_of};
 use crate::assess::{Limits, camera_shows_pattern};
 use crate::diagnose::{
-    CheckContext, Diagnosis, Finding, many_left_out, observations_left_out, residual_pattern, tags_off,
+    CheckContext, Diagnosis, Finding, many_left_out, observations_left_out, residual_pattern, tags_off, uneven_plates,
 };
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{Fit, FreePose, FreePoses, PlacedCamera};
@@ -105,6 +105,7 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     findings.extend(observations_left_out(&fit, limits).map(Finding::from));
     findings.extend(residual_pattern(&fit, limits).map(Finding::from));
     findings.extend(tags_off(&fit, limits).into_iter().map(Finding::from));
+    findings.extend(uneven_plates(&fit, limits).into_iter().map(Finding::from));
     let lost = losses(&fit.adjustment, &free_poses).into_iter().filter(|lens| lens.loss_px.is_none());
     findings.extend(lost.map(Finding::from));
     Ok(StandAlone { fit, free_poses, series, starts, notices, findings })
