@@ -22,14 +22,22 @@ pub fn flange_at(model: &FoundModel, readings: &[Vec<f64>]) -> Result<Vec<Predic
     Ok(readings.iter().map(|q| flange.at(q)).collect())
 }
 
+/// What the flange is stated relative to, by its name among the parameters: of several placements of the plate (fixed cameras) that of the
+/// first image on the robot.
+pub fn relative_to(model: &FoundModel) -> &str {
+    let name = model.still.map(|(_, column)| model.layout.columns[column].name.as_str()).unwrap_or_default();
+    name.rsplit_once('.').map_or(name, |(body, _)| body)
+}
+
 /// Text of at.csv: readings, pose relative to the plate (a fixed camera), sigmas, joints outside the range of the stops, upper
-/// triangle of the covariance of the body twist (m, rad, translation first).
+/// triangle of the covariance of the body twist (m, rad, translation first), and relative to what.
 pub fn at_csv(model: &FoundModel, readings: &[Vec<f64>], found: &[PredictedFlange]) -> String {
     let mut head: Vec<String> = model.robot.chain.readings.clone();
     let plain = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw", "sigma_mm", "sigma_mrad", "outside"];
     head.extend(plain.map(String::from));
     let upper = || (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
     head.extend(upper().map(|(i, j)| format!("c{}{}", i + 1, j + 1)));
+    head.push("relative_to".into());
     let mut rows = vec![head];
     for (q, f) in readings.iter().zip(found) {
         let [position, rotation] = f.sigmas();
@@ -40,6 +48,7 @@ pub fn at_csv(model: &FoundModel, readings: &[Vec<f64>], found: &[PredictedFlang
         let mut row: Vec<String> = numbers.map(number).collect();
         row.push(f.outside.join(" "));
         row.extend(upper().map(|(i, j)| number(f.covariance[(i, j)])));
+        row.push(relative_to(model).to_owned());
         rows.push(row);
     }
     to_csv(&rows)

@@ -249,7 +249,10 @@ fn the_folder_of_predicted_flanges_is_made() {
     let args = ["show", &solution, "--at", at.to_str().unwrap(), "--at-unit", "deg", "--out", out.to_str().unwrap()];
     let output = robotcal(&args);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output));
-    assert_eq!(std::fs::read_to_string(out.join("at.csv")).unwrap().lines().filter(|l| !l.starts_with('#')).count(), 2);
+    let table = std::fs::read_to_string(out.join("at.csv")).unwrap();
+    assert_eq!(table.lines().filter(|l| !l.starts_with('#')).count(), 2);
+    let last = |line: usize| table.lines().nth(line).unwrap().rsplit(',').next().unwrap().to_owned();
+    assert_eq!([0, 1].map(last), ["relative_to", "plate/placement_0"]);
     let as_radians = robotcal(&["show", &solution, "--at", at.to_str().unwrap(), "--at-unit", "rad"]);
     assert_eq!(as_radians.status.code(), Some(2));
     assert!(text(&as_radians).contains(Code::DegreesAsRadians.name()), "{}", text(&as_radians));

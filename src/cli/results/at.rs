@@ -7,7 +7,7 @@ use clap::Args;
 
 use crate::cli::flags::joint_table::{self, Unit};
 use crate::error::Result;
-use crate::output::flange_table::{at_csv, flange_at};
+use crate::output::flange_table::{at_csv, flange_at, relative_to};
 use crate::output::restore::{entered_offsets, exported_model};
 use crate::output::solution_json::SolutionRecord;
 use crate::output::write_beside;
@@ -17,7 +17,7 @@ use crate::urdf::Chain;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "The flange at given readings")]
 pub(super) struct AtArgs {
-    /// Joint vectors (CSV, columns named as the joints): pose and uncertainty of the flange relative to the plate, by the corrected URDF with compensation.toml, go to at.csv. A constant displacement of the flange, which no series tells, is in no uncertainty there: that of the camera on it is in hand_camera.yaml
+    /// Joint vectors (CSV, columns named as the joints): pose and uncertainty of the flange relative to the plate (of several placements that of the first image, named in relative_to), by the corrected URDF with compensation.toml, go to at.csv. A constant displacement of the flange, which no series tells, is in no uncertainty there: that of the camera on it is in hand_camera.yaml
     #[arg(long, value_name = "FILE", requires = "at_unit")]
     at: Option<PathBuf>,
     /// Unit of the revolute joints in that file
@@ -87,11 +87,15 @@ impl AtTable<'_> {
                 1e3 * rotation
             );
         }
+        let still = relative_to(&model);
+        let among = if still.starts_with("plate/") { record.placements.len() } else { record.mountings.len() };
         let _ = writeln!(
             out,
-            "at        {} joint vectors in {}; the robot is the corrected URDF with compensation.toml{}",
+            "at        {} joint vectors in {}, relative to {}{}; the robot is the corrected URDF with compensation.toml{}",
             found.len(),
             path.display(),
+            still,
+            if among > 1 { format!(" (of {among} that of the first image on the robot)") } else { String::new() },
             if entered_offsets(record)?.iter().any(|offset| *offset != 0.0) {
                 ", the readings those of the controller with the offsets of mastering.csv entered"
             } else {
