@@ -232,6 +232,7 @@ codes! {
         ImageDelayFound "image_delay_found" "motion in the images tells of a delay, which is taken off",
         RobotNeverStill "robot_never_still" "the robot never stands still long enough",
         JointSilent "joint_silent" "joints have no readings for a part of a recording",
+        JointStatesOfTwo "joint_states_of_two" "joint states of two publishers stand in one topic",
         ImagesInMotion "images_in_motion" "images were taken while the robot moved",
         StandstillWithoutImage "standstill_without_image" "a standstill has no image",
         StopsNotRecorded "stops_not_recorded" "stops are not in the recording: images or readings are missing",

@@ -10,6 +10,7 @@ use super::motion::{Posture, Standstill, interpolate, postures, standstills};
 use super::options::{Clock, Motion, RecordingOptions};
 use super::scan::{JointReadings, Scan, scan};
 use super::silence::{self, Gaps};
+use super::two_publishers;
 use super::unit;
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::{AngleUnit, InputFile, Stops};
@@ -70,6 +71,9 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     for posture in &mut postures {
         posture.positions.iter_mut().zip(&factors).for_each(|(q, factor)| *q *= factor);
     }
+    let still_speeds: Vec<f64> = factors.iter().map(|factor| options.still_speed / factor).collect();
+    let joints_place = format!("{}, topic {}", recording.display(), topics.join(", "));
+    two_publishers::require_one(&joints_place, &samples, &joints, &still_speeds)?;
     require_overlap(&scan, &postures, &times)?;
     let image_delay_s = scan.delay_s(std::slice::from_ref(&image_topic)) - scan.delay_s(&topics);
     let guess = match options.clock {
@@ -89,7 +93,6 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let begin_ns = samples.iter().map(|s| s.time_ns).min().unwrap_or_default();
     let is_open = told == Told::Open && options.clock == Clock::Stamp && image_delay_s.abs() > NOTABLE_DELAY_S;
     let open = if is_open { nanoseconds(-image_delay_s) } else { 0 };
-    let still_speeds: Vec<f64> = factors.iter().map(|factor| options.still_speed / factor).collect();
     let later = (later_ns + open.min(0), later_ns + open.max(0));
     scan.notices.extend(silence::notices(recording, &samples, &joints, (&times, later)));
     scan.notices.extend(Gaps::of(&samples, &joints, &still_speeds).leave_out(recording, begin_ns, later, &mut times));
@@ -265,14 +268,14 @@ fn groups(
 ) -> Result<Vec<Group>> {
     let still = standstills(postures, options.still_speed, nanoseconds(options.least_still_s));
     let mut groups: Vec<Group> = Vec::new();
-    let mut empty = 0;
-    let mut used = 0;
+    let (mut empty, mut used, mut standing) = (0, 0, Standing::default());
     for standstill in &still {
         let Standstill { from_ns, to_ns } = shrunk(*standstill);
         let (from_ns, to_ns) = (from_ns + open.max(0), to_ns + open.min(0));
         let first = times.partition_point(|t| *t < from_ns);
         let inside = &times[first..times.partition_point(|t| *t <= to_ns).max(first)];
         used += inside.len();
+        standing.add([from_ns, to_ns], times);
         match inside {
             [] => empty += 1,
             _ => groups.push(spread(inside)),
@@ -295,6 +298,8 @@ fn groups(
             }
         }
         groups.sort();
+    } else if !groups.is_empty() && standing.is_missed(used, times.len()) {
+        return Err(missed(&place, used, times.len()));
     } else if used < times.len() && !groups.is_empty() {
         let what = format!(
             "{} of {} images were taken outside the standstills and are not used",
@@ -328,6 +333,45 @@ fn groups(
         return Err(no_stop(&place, postures, [still.len(), short], options));
     }
     Ok(groups)
+}
+
+/// Standstills of the time in which images were taken.
+#[derive(Debug, Default)]
+struct Standing {
+    count: usize,
+    without_image: usize,
+    /// Their share of that time.
+    share: f64,
+}
+
+impl Standing {
+    fn add(&mut self, [from_ns, to_ns]: [i64; 2], times: &[i64]) {
+        let (Some(first), Some(last)) = (times.first(), times.last()) else { return };
+        let lasts_ns = to_ns.min(*last) - from_ns.max(*first);
+        if lasts_ns > 0 {
+            self.count += 1;
+            self.without_image += usize::from(!times.iter().any(|t| (from_ns..=to_ns).contains(t)));
+            self.share += lasts_ns as f64 / (last - first) as f64;
+        }
+    }
+
+    /// Whether images miss the standstills as they do not by chance.
+    fn is_missed(&self, used: usize, images: usize) -> bool {
+        2 * self.without_image > self.count && ((CHANCE * used) as f64) < self.share * images as f64
+    }
+}
+
+/// Images in the standstills are fewer than one in so many of those that chance would put there.
+const CHANCE: usize = 4;
+
+/// Images were taken at the stops and bear other times.
+fn missed(place: &str, used: usize, images: usize) -> Error {
+    let what = format!(
+        "{} of {images} images were taken outside the standstills, more than by chance: their times are not those of the joint states",
+        images - used
+    );
+    let remedy = "state how late the images are (--image-delay SECONDS), or take the times of recording (--clock log)";
+    Error::new(Code::ImagesInMotion, place, what, remedy)
 }
 
 /// Standstills that are shorter than what counts as one, with images.
@@ -422,6 +466,24 @@ mod tests {
         let (postures, times) = recorded(&short);
         let error = groups(&mut Scan::default(), &postures, &times, &options, 0).unwrap_err();
         assert_eq!((error.code, error.what.contains("3 places")), (Code::RobotNeverStill, true), "{error}");
+    }
+
+    /// An image at every stop, whose times are late; and a camera that is slow.
+    #[test]
+    fn images_that_miss_the_stops_are_refused_and_slow_ones_are_not() {
+        let drive = [(100, false), (80, true)].repeat(20);
+        let (postures, times) = recorded(&drive);
+        let options = RecordingOptions::default();
+        let late: Vec<i64> = (0..20).map(|k| (k * 180 + if k == 7 { 50 } else { 140 }) * 10_000_000).collect();
+        let error = groups(&mut Scan::default(), &postures, &late, &options, 0).unwrap_err();
+        assert_eq!(error.code, Code::ImagesInMotion, "{error}");
+        // Every 5 s, without regard to the stops, which have one in about two or three.
+        let slow: Vec<i64> = times.iter().copied().step_by(100).collect();
+        let taken = groups(&mut Scan::default(), &postures, &slow, &options, 0).unwrap().len();
+        assert!((2..10).contains(&taken), "{taken}");
+        // Only the last stops have images, at a high rate.
+        let last = &times[times.len() * 4 / 5..];
+        assert_eq!(groups(&mut Scan::default(), &postures, last, &options, 0).unwrap().len(), 4);
     }
 
     #[test]

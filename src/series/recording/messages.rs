@@ -8,11 +8,15 @@ pub(super) const IMAGE: &str = "sensor_msgs/msg/Image";
 pub(super) const COMPRESSED_IMAGE: &str = "sensor_msgs/msg/CompressedImage";
 pub(super) const CAMERA_INFO: &str = "sensor_msgs/msg/CameraInfo";
 
+/// Stamp of a message header, ns, and its frame.
+fn header<'a>(cdr: &mut Cdr<'a>) -> Decoded<(i64, &'a str)> {
+    let (seconds, nanoseconds) = (cdr.i32()?, cdr.u32()?);
+    Ok((i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds), cdr.string()?))
+}
+
 /// Stamp of a message header, ns.
 pub(super) fn stamp(cdr: &mut Cdr<'_>) -> Decoded<i64> {
-    let (seconds, nanoseconds) = (cdr.i32()?, cdr.u32()?);
-    cdr.string()?;
-    Ok(i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds))
+    header(cdr).map(|(stamp_ns, _)| stamp_ns)
 }
 
 /// Stamp of a message that begins with a header, ns.
@@ -20,10 +24,12 @@ pub(super) fn stamp_of(message: &[u8]) -> Decoded<i64> {
     stamp(&mut Cdr::new(message)?)
 }
 
-/// `sensor_msgs/JointState` without velocity and effort.
+/// `sensor_msgs/JointState` without the values of velocity and effort.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct JointState {
     pub stamp_ns: i64,
+    /// What the messages of a publisher have in common: frame, and whether velocities and efforts are there.
+    pub marks: Vec<String>,
     pub names: Vec<String>,
     /// As recorded: angles in rad or deg, lengths in m.
     pub positions: Vec<f64>,
@@ -32,19 +38,25 @@ pub(super) struct JointState {
 impl JointState {
     pub fn read(message: &[u8]) -> Decoded<Self> {
         let mut cdr = Cdr::new(message)?;
-        let stamp_ns = stamp(&mut cdr)?;
+        let (stamp_ns, frame) = header(&mut cdr)?;
         let (names, positions) = (cdr.strings()?, cdr.f64s()?);
         if names.len() != positions.len() && !positions.is_empty() {
             return Err(format!("has {} names and {} positions", names.len(), positions.len()));
         }
-        Ok(Self { stamp_ns, names, positions })
+        // What ends early has none; its positions count all the same.
+        let mut has = |what: &str| match cdr.f64s() {
+            Ok(values) if !values.is_empty() => what.to_owned(),
+            _ => format!("no {what}"),
+        };
+        let marks = vec![format!("frame_id \"{}\"", frame.escape_debug()), has("velocities"), has("efforts")];
+        Ok(Self { stamp_ns, marks, names, positions })
     }
 
     /// The joints that have a position: drivers write NaN for those that they do not measure.
     pub fn finite(self) -> Self {
         let both = self.names.into_iter().zip(self.positions).filter(|(_, q)| q.is_finite());
         let (names, positions) = both.unzip();
-        Self { stamp_ns: self.stamp_ns, names, positions }
+        Self { stamp_ns: self.stamp_ns, marks: self.marks, names, positions }
     }
 
     /// The joints whose position is no number.

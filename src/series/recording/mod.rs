@@ -28,6 +28,7 @@ mod records;
 mod scan;
 mod silence;
 mod sqlite;
+mod two_publishers;
 mod unit;
 #[cfg(feature = "mcap")]
 mod write;

@@ -218,6 +218,7 @@ mod tests {
             names: Rc::new(vec![name.to_string()]),
             positions: vec![q],
             unread: Rc::default(),
+            marks: Rc::default(),
         };
         let samples = [sample(30, "a", 3.0), sample(10, "a", 1.0), sample(20, "b", 2.0), sample(40, "c", 4.0)];
         let joints = ["a".to_string(), "b".to_string()];

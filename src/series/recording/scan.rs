@@ -25,6 +25,8 @@ pub(super) struct JointSample {
     pub positions: Vec<f64>,
     /// Joints of the message without a position that is a number.
     pub unread: Rc<Vec<String>>,
+    /// What tells its publisher from others, see [`JointState::marks`].
+    pub marks: Rc<Vec<String>>,
 }
 
 /// The joint states of a robot.
@@ -50,6 +52,28 @@ struct Topic {
     delays_ns: Vec<(i64, i64)>,
     written: Written,
 }
+
+/// The encoding of ROS 2.
+const CDR: &str = "cdr";
+
+impl Topic {
+    /// A message of one of these types, whoever named it: `sensor_msgs/msg/Image`, `sensor_msgs/Image`, `foxglove.Image`.
+    fn is_of(&self, types: &[&str]) -> bool {
+        self.schema.rsplit(['/', '.']).next().is_some_and(|own| types.contains(&own))
+    }
+}
+
+/// What a topic is looked for.
+struct Wanted {
+    what: &'static str,
+    flag: &'static str,
+    /// Types by which it goes in other encodings.
+    types: &'static [&'static str],
+}
+
+const JOINTS: Wanted = Wanted { what: "joint states", flag: "--joint-topic", types: &["JointState", "JointStates"] };
+const IMAGES: Wanted =
+    Wanted { what: "images", flag: "--image-topic", types: &["Image", "RawImage", "CompressedImage"] };
 
 /// Everything of the first pass.
 #[derive(Debug, Default)]
@@ -118,7 +142,7 @@ impl Scan {
         topic.schema = message.schema.to_string();
         topic.encoding = message.encoding.to_string();
         topic.messages += 1;
-        if message.encoding != "cdr" {
+        if message.encoding != CDR {
             return;
         }
         if let Err(reason) = self.decode(message, clock)
@@ -143,12 +167,13 @@ impl Scan {
                 }
                 let samples = self.joints.entry(message.topic.to_string()).or_default();
                 let names = shared(samples.last().map(|last| &last.names), state.names, &mut self.held);
+                let marks = shared(samples.last().map(|last| &last.marks), state.marks, &mut self.held);
                 let unread = shared(samples.last().map(|last| &last.unread), unread, &mut self.held);
                 self.held += size_of::<JointSample>() + size_of_val(&state.positions[..]);
                 if self.held > MOST_HELD {
                     return Ok(());
                 }
-                samples.push(JointSample { time_ns, names, positions: state.positions, unread });
+                samples.push(JointSample { time_ns, names, positions: state.positions, unread, marks });
             }
             messages::IMAGE | messages::COMPRESSED_IMAGE => {
                 let time_ns = self.stamped(message, messages::stamp_of(message.data)?, clock);
@@ -168,7 +193,8 @@ impl Scan {
             let unread = shared(samples.last().map(|last| &last.unread), joints, &mut self.held);
             self.held += size_of::<JointSample>();
             if self.held <= MOST_HELD {
-                samples.push(JointSample { time_ns, names: Rc::default(), positions: Vec::new(), unread });
+                let (names, positions, marks) = (Rc::default(), Vec::new(), Rc::default());
+                samples.push(JointSample { time_ns, names, positions, unread, marks });
             }
         }
         Err("has no position that is finite".into())
@@ -211,8 +237,8 @@ impl Scan {
         let shown = self.recording.display().to_string();
         if let Some((name, topic)) = self.topics.iter().find(|(_, t)| t.encoding == "ros1") {
             let what = format!("holds ROS 1 messages ({name}: {})", topic.schema);
-            let remedy =
-                format!("convert it: pip install rosbags; rosbags-convert --src {shown} --dst run1 --dst-storage mcap");
+            let remedy = "convert the .bag that it was made of: pip install rosbags; rosbags-convert --src run1.bag --dst run1 --dst-storage \
+                          mcap (it reads no ROS 1 messages within MCAP)";
             return Err(Error::new(Code::RecordingFormat, shown, what, remedy));
         }
         if self.held > MOST_HELD {
@@ -245,33 +271,66 @@ impl Scan {
     }
 
     fn with_schema<'a>(&'a self, schemas: &'a [&str]) -> impl Iterator<Item = &'a str> {
-        self.topics.iter().filter(|(_, t)| schemas.contains(&t.schema.as_str())).map(|(name, _)| name.as_str())
+        let is_one = |topic: &Topic| topic.encoding == CDR && schemas.contains(&topic.schema.as_str());
+        self.topics.iter().filter(move |(_, t)| is_one(t)).map(|(name, _)| name.as_str())
     }
 
     /// The topic asked for, or the only one among the candidates.
-    fn choose<'a>(&self, asked: Option<&'a str>, candidates: &[&'a str], what: &str, flag: &str) -> Result<&'a str> {
+    fn choose<'a>(&self, asked: Option<&'a str>, candidates: &[&'a str], wanted: &Wanted) -> Result<&'a str> {
         let place = || self.recording.display();
+        let Wanted { what, flag, .. } = wanted;
         let all = || {
             let rows = self.topics.iter().map(|(name, t)| format!("{name} ({}, {})", t.schema, t.messages));
             rows.collect::<Vec<_>>().join("; ")
         };
+        let is_there = asked.map_or(!candidates.is_empty(), |asked| candidates.contains(&asked));
+        if !is_there && let Some(error) = self.in_other_encoding(asked, wanted) {
+            return Err(error);
+        }
         match (asked, candidates) {
             (Some(asked), _) if candidates.contains(&asked) => Ok(asked),
+            (None, [one]) => Ok(one),
             (Some(asked), _) => {
                 let said = format!("topic {asked} has no {what}; its topics are: {}", all());
                 Err(Error::new(Code::TopicMissing, place(), said, format!("name another {flag}")))
             }
-            (None, [one]) => Ok(one),
             (None, []) => {
                 let damage: String = self.notices.iter().map(|n| format!(" ({})", n.what)).collect();
                 let said = format!("has no {what}{damage}; its topics are: {}", all());
-                Err(Error::new(Code::TopicMissing, place(), said, "record them as well (ros2 bag record -s mcap -a)"))
+                Err(Error::new(Code::TopicMissing, place(), said, self.to_record(wanted)))
             }
             (None, several) => {
                 let said = format!("has several topics with {what}: {}", several.join(", "));
                 Err(Error::new(Code::TopicAmbiguous, place(), said, format!("name one with {flag}")))
             }
         }
+    }
+
+    /// What is wanted is there, in an encoding that is not read.
+    fn in_other_encoding(&self, asked: Option<&str>, wanted: &Wanted) -> Option<Error> {
+        let is_one = |name: &str, topic: &Topic| {
+            asked.is_none_or(|asked| asked == name) && topic.encoding != CDR && topic.is_of(wanted.types)
+        };
+        let (name, topic) = self.topics.iter().find(|(name, topic)| is_one(name, topic))?;
+        let what = format!(
+            "its {} messages {} are in {}; what is read is CDR, in which ROS 2 records",
+            topic.messages,
+            topic.schema,
+            topic.encoding.escape_debug()
+        );
+        let remedy =
+            "record with ROS 2 (ros2 bag record -s mcap -a), or write the messages anew as sensor_msgs of ROS 2 in CDR";
+        let place = format!("{}, topic {name}", self.recording.display());
+        Some(Error::new(Code::MessagesUnreadable, place, what, remedy))
+    }
+
+    /// What to do where nothing of what is wanted was recorded.
+    fn to_record(&self, wanted: &Wanted) -> String {
+        let mut remedy = "record them as well (ros2 bag record -s mcap -a)".to_owned();
+        if wanted.what == JOINTS.what && self.topics.values().any(|topic| topic.is_of(&["TFMessage"])) {
+            remedy += "; where its frames have the poses of the flange, write these into controller.csv of a series folder, beside the images";
+        }
+        remedy
     }
 
     /// Joints of which a topic has positions.
@@ -300,7 +359,7 @@ impl Scan {
                 return Ok(candidates.into_iter().map(str::to_owned).collect());
             }
         }
-        Ok(vec![self.choose(asked, &candidates, "joint states", "--joint-topic")?.to_owned()])
+        Ok(vec![self.choose(asked, &candidates, &JOINTS)?.to_owned()])
     }
 
     /// The joint states, with the joints to read (all that there are when none are asked for).
@@ -311,7 +370,7 @@ impl Scan {
         names.iter().try_for_each(|n| plain_name("joint", n, &place).map(|_| ()))?;
         let missing: Vec<&str> = options.joints.iter().filter(|j| !names.contains(j)).map(String::as_str).collect();
         if names.is_empty() {
-            return Err(self.unreadable(&topics[0], "joint states"));
+            return Err(self.unreadable(&topics[0], &JOINTS));
         }
         if !missing.is_empty() {
             let what = format!("has no positions of {}; its joints are: {}", missing.join(", "), names.join(", "));
@@ -342,23 +401,23 @@ impl Scan {
             // The same images twice: the raw ones are better.
             candidates.retain(|c| c.strip_suffix("/compressed").is_none_or(|base| !raw.contains(&base)));
         }
-        let topic = self.choose(asked, &candidates, "images", "--image-topic")?.to_string();
+        let topic = self.choose(asked, &candidates, &IMAGES)?.to_string();
         let times = self.images.remove(&topic).unwrap_or_default();
         if times.is_empty() {
-            return Err(self.unreadable(&topic, "images"));
+            return Err(self.unreadable(&topic, &IMAGES));
         }
         Ok((topic, times))
     }
 
     /// A topic without one message of use.
-    fn unreadable(&self, topic: &str, what: &str) -> Error {
+    fn unreadable(&self, topic: &str, wanted: &Wanted) -> Error {
         let reason = self.topics.get(topic).map_or("", |t| t.reason.as_str());
         let place = format!("{}, topic {topic}", self.recording.display());
         let reason = if reason.is_empty() { String::new() } else { format!(": one {reason}") };
         Error::new(
             Code::MessagesUnreadable,
             place,
-            format!("none of its {what} can be used{reason}"),
+            format!("none of its {} can be used{reason}", wanted.what),
             "record it again",
         )
     }
@@ -464,6 +523,27 @@ mod tests {
         assert_eq!(code(&scan, &["x", "a", "b"]), Code::TopicAmbiguous);
         let readings = scan.joint_readings(&wanted(&["x", "b"])).unwrap();
         assert_eq!((readings.samples.len(), readings.joints), (2, vec!["x".to_owned(), "b".to_owned()]));
+    }
+
+    /// Other recorders write joint states in JSON or protobuf: they are there, and cannot be read.
+    #[test]
+    fn topics_in_another_encoding_are_named_with_it() {
+        let code = |scan: &mut Scan, asked: Option<&str>| {
+            let options = RecordingOptions { joint_topic: asked.map(str::to_owned), ..RecordingOptions::default() };
+            scan.joint_readings(&options).map(|readings| readings.topics).map_err(|e| (e.code, e.what.contains("json")))
+        };
+        for schema in ["sensor_msgs/JointState", messages::JOINT_STATE, "foxglove.JointStates"] {
+            let mut scan = Scan::default();
+            let json = Message { topic: "/json", schema, encoding: "json", log_time_ns: 1, data: b"{}" };
+            scan.note(&json, Clock::Stamp);
+            assert_eq!(code(&mut scan, None), Err((Code::MessagesUnreadable, true)), "{schema}");
+            let data = joint_state(&[("a", 0.5)]);
+            let cdr =
+                Message { topic: "/cdr", schema: messages::JOINT_STATE, encoding: CDR, log_time_ns: 1, data: &data };
+            scan.note(&cdr, Clock::Stamp);
+            assert_eq!(code(&mut scan, Some("/json")), Err((Code::MessagesUnreadable, true)), "{schema}");
+            assert_eq!(code(&mut scan, None), Ok(vec!["/cdr".to_owned()]));
+        }
     }
 
     #[test]

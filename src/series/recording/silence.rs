@@ -177,6 +177,7 @@ mod tests {
             names: Rc::new(vec![joint.to_owned()]),
             positions: vec![0.0],
             unread: Rc::default(),
+            marks: Rc::default(),
         };
         // "b" pauses for half a second, then ends after four seconds of ten.
         let of_b = (0..40).filter(|tenth| !(20..24).contains(tenth));
@@ -202,7 +203,8 @@ mod tests {
         let at = |hundredth: i64| {
             let names = if (101..134).contains(&hundredth) { &a } else { &both };
             let positions = vec![0.0; names.len()];
-            JointSample { time_ns: hundredth * SECOND / 100, names: Rc::clone(names), positions, unread: Rc::default() }
+            let (time_ns, names) = (hundredth * SECOND / 100, Rc::clone(names));
+            JointSample { time_ns, names, positions, unread: Rc::default(), marks: Rc::default() }
         };
         let samples: Vec<_> = (0..300).filter(|k| !(181..220).contains(k)).map(at).collect();
         let joints = ["a".to_owned(), "b".to_owned()];
@@ -225,6 +227,7 @@ mod tests {
             names: names(told.iter().map(|(joint, _)| *joint).collect()),
             positions: told.iter().map(|(_, position)| *position).collect(),
             unread: names(unread.to_vec()),
+            marks: Rc::default(),
         }
     }
 

@@ -1,0 +1,227 @@
+//! Joint states of two publishers in one topic: readings that go to and fro as no joint does.
+
+use super::motion::WINDOW_NS;
+use super::scan::JointSample;
+use crate::error::{Code, Error, Result};
+
+/// Of two publishers, one sends no more than so many times between two messages of the other where readings are seen to leave and come back.
+const MOST_AWAY: usize = 3;
+/// A reading that is back after longer may have been moved there and back, ns.
+const LONGEST_NS: i64 = 250_000_000;
+/// It is back where no more than this share of the way is left.
+const BACK: f64 = 0.1;
+/// What goes to and fro by less than this share of all that the joint moves is noise, whatever the unit.
+const LEAST_OF_RANGE: f64 = 5e-4;
+/// Or by less than so many of the smallest steps of its readings.
+const LEAST_STEPS: f64 = 5.0;
+/// Fewer times, or more seldom than every so many ns: readings that failed.
+const LEAST: usize = 10;
+const SELDOM_NS: i64 = 10_000_000_000;
+/// Readings of a joint that turns on jump by a full turn, rad or deg, to within this share.
+const TURNS: [f64; 2] = [std::f64::consts::TAU, 360.0];
+const TURN_SHARE: f64 = 0.01;
+
+/// One joint at one time.
+#[derive(Debug, Clone, Copy)]
+struct Reading<'a> {
+    time_ns: i64,
+    position: f64,
+    sample: &'a JointSample,
+}
+
+/// A reading that is left, and the one between it and its return.
+type Pair<'a> = [Reading<'a>; 2];
+
+/// Refuses joint states of two publishers: nobody knows which of them the robot follows. `still_speeds`: of each joint, in the units of its
+/// readings.
+///
+/// # Errors
+/// As the name says, with what each of them shows.
+pub(super) fn require_one(place: &str, samples: &[JointSample], joints: &[String], still_speeds: &[f64]) -> Result<()> {
+    let mut most: Option<(&String, Vec<Pair>)> = None;
+    for (joint, still_speed) in joints.iter().zip(still_speeds) {
+        let readings = readings(samples, joint);
+        let pairs = to_and_fro(&readings, still_speed * 2e-9 * WINDOW_NS as f64);
+        if is_often(&readings, pairs.len()) && most.as_ref().is_none_or(|(_, others)| pairs.len() > others.len()) {
+            most = Some((joint, pairs));
+        }
+    }
+    let Some((joint, pairs)) = most else { return Ok(()) };
+    let begin_ns = samples.iter().map(|s| s.time_ns).min().unwrap_or_default();
+    let remedy = "record one publisher: stop the other (ros2 topic info -v names both), or give it a topic of its own and choose with --joint-topic";
+    Err(Error::new(Code::JointStatesOfTwo, place, described(joint, &pairs, begin_ns), remedy))
+}
+
+/// The readings of a joint in the order of time.
+fn readings<'a>(samples: &'a [JointSample], joint: &str) -> Vec<Reading<'a>> {
+    let of = |sample: &'a JointSample| {
+        let i = sample.names.iter().position(|name| name == joint)?;
+        Some(Reading { time_ns: sample.time_ns, position: sample.positions[i], sample })
+    };
+    let mut readings: Vec<Reading> = samples.iter().filter_map(of).collect();
+    readings.sort_by_key(|reading| reading.time_ns);
+    readings
+}
+
+fn is_often(readings: &[Reading], count: usize) -> bool {
+    let (Some(first), Some(last)) = (readings.first(), readings.last()) else { return false };
+    let lasted_ns = last.time_ns.saturating_sub(first.time_ns);
+    count >= LEAST && (count as f64) * SELDOM_NS as f64 >= lasted_ns as f64
+}
+
+/// Readings that are left by `least` or more and come back at once.
+fn to_and_fro<'a>(readings: &[Reading<'a>], least: f64) -> Vec<Pair<'a>> {
+    let steps = readings.windows(2).map(|w| (w[1].position - w[0].position).abs());
+    let smallest = steps.filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min);
+    let (low, high) = range(readings.iter());
+    let least =
+        least.max(LEAST_OF_RANGE * (high - low)).max(if smallest.is_finite() { LEAST_STEPS * smallest } else { 0.0 });
+    let mut pairs = Vec::new();
+    let mut from = 0;
+    while from < readings.len() {
+        match (2..=MOST_AWAY + 1).find(|steps| is_back(readings, from, *steps, least)) {
+            Some(steps) => {
+                let pair = [readings[from], readings[from + 1]];
+                pairs.push(pairs.last().map_or(pair, |before| oriented(pair, before)));
+                from += steps;
+            }
+            None => from += 1,
+        }
+    }
+    pairs
+}
+
+/// Whether a reading that was there before is left at once, and back after so many steps. A joint that turns back comes from further away.
+fn is_back(readings: &[Reading], from: usize, steps: usize, least: f64) -> bool {
+    let (left, Some(back)) = (&readings[from], readings.get(from + steps)) else { return false };
+    let far = |reading: &Reading| (reading.position - left.position).abs();
+    let away = &readings[from + 1..from + steps];
+    let way = away.iter().map(far).fold(f64::INFINITY, f64::min);
+    let before = &readings[from.saturating_sub(MOST_AWAY + 1)..from];
+    let is_turn = |way: f64| TURNS.iter().any(|turn| (way - turn).abs() < TURN_SHARE * turn);
+    way >= least
+        && far(back) <= BACK * way
+        && before.iter().any(|reading| far(reading) <= BACK * way)
+        && back.time_ns.saturating_sub(left.time_ns) <= LONGEST_NS
+        && !away.iter().map(far).any(is_turn)
+}
+
+/// The pair in the order of the one before it: one of them goes on, or both are as far apart as they were.
+fn oriented<'a>(pair: Pair<'a>, before: &Pair) -> Pair<'a> {
+    let [one, other] = pair.map(|reading| reading.position);
+    let [was_one, was_other] = before.map(|reading| reading.position);
+    let apart = |one: f64, other: f64| {
+        let differences = [one - was_one, other - was_other, other - one - (was_other - was_one)];
+        differences.into_iter().map(f64::abs).fold(f64::INFINITY, f64::min)
+    };
+    if apart(other, one) < apart(one, other) { [pair[1], pair[0]] } else { pair }
+}
+
+fn range<'a, 'b: 'a>(readings: impl Iterator<Item = &'a Reading<'b>>) -> (f64, f64) {
+    readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), r| (low.min(r.position), high.max(r.position)))
+}
+
+/// What the two show, and what in their messages tells them apart.
+fn described(joint: &str, pairs: &[Pair], begin_ns: i64) -> String {
+    let ranges = [0, 1].map(|k| range(pairs.iter().map(|pair| &pair[k])));
+    let names = names(pairs);
+    let shown = [0, 1].map(|k| format!("{} reads {:.4} to {:.4}", names[k], ranges[k].0, ranges[k].1));
+    let [left, away] = pairs[0];
+    format!(
+        "holds joint states of two publishers: {joint} goes to and fro {} times, at first {:.2} s after the first joint state between {:.4} and \
+         {:.4}; {}, {}",
+        pairs.len(),
+        left.time_ns.saturating_sub(begin_ns) as f64 * 1e-9,
+        left.position,
+        away.position,
+        shown[0],
+        shown[1]
+    )
+}
+
+/// The two by the marks of their messages that always differ; without any they are just two.
+fn names(pairs: &[Pair]) -> [String; 2] {
+    let marks = |reading: &Reading| {
+        let joints = format!("joints {}", reading.sample.names.join(" "));
+        reading.sample.marks.iter().cloned().chain([joints]).collect::<Vec<_>>()
+    };
+    let of_first = pairs[0].each_ref().map(marks);
+    let is_constant = |mark: usize| {
+        pairs.iter().all(|pair| {
+            let own = pair.each_ref().map(marks);
+            (0..2).all(|k| own[k].get(mark) == of_first[k].get(mark))
+        })
+    };
+    let differ = |mark: &usize| of_first[0].get(*mark) != of_first[1].get(*mark) && is_constant(*mark);
+    let telling: Vec<usize> = (0..of_first[0].len()).filter(differ).collect();
+    let named = |k: usize, plain: &str| {
+        let own: Vec<&str> = telling.iter().filter_map(|mark| of_first[k].get(*mark)).map(String::as_str).collect();
+        if own.is_empty() { plain.to_owned() } else { format!("{plain} ({})", own.join(", ")) }
+    };
+    [named(0, "the one"), named(1, "the other")]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::rc::Rc;
+
+    const MS: i64 = 1_000_000;
+
+    /// A joint that moves 0.4 rad in every third second, as recorded every 10 ms.
+    fn position(time_ns: i64) -> f64 {
+        let seconds = time_ns as f64 * 1e-9;
+        0.3 + 0.4 * ((seconds / 3.0).floor() + (seconds % 3.0 - 2.0).max(0.0))
+    }
+
+    fn sample(time_ns: i64, position: f64, frame: &str) -> JointSample {
+        JointSample {
+            time_ns,
+            names: Rc::new(vec!["a".to_owned()]),
+            positions: vec![position],
+            unread: Rc::default(),
+            marks: Rc::new(vec![frame.to_owned()]),
+        }
+    }
+
+    /// The robot, and another publisher every so many ms.
+    fn recorded(every_ms: i64, other: impl Fn(i64) -> f64) -> Vec<JointSample> {
+        let own = (0..2000).map(|k| sample(k * 10 * MS, position(k * 10 * MS), "arm"));
+        let others = (0..20_000 / every_ms).map(|k| (k * every_ms + 5) * MS).map(|t| sample(t, other(t), "gui"));
+        own.chain(others).collect()
+    }
+
+    fn refused(samples: &[JointSample]) -> Option<Error> {
+        require_one("run.mcap", samples, &["a".to_owned()], &[5e-3]).err()
+    }
+
+    #[test]
+    fn two_publishers_are_named_with_what_each_of_them_shows() {
+        for every_ms in [10, 20, 33, 100, 1000] {
+            let error = refused(&recorded(every_ms, |_| 0.0)).unwrap();
+            assert_eq!(error.code, Code::JointStatesOfTwo, "{every_ms}");
+            assert!(["gui", "arm"].iter().all(|frame| error.what.contains(frame)), "{error}");
+            assert!(refused(&recorded(every_ms, |t| position(t) + 0.01)).is_some(), "{every_ms}");
+        }
+    }
+
+    #[test]
+    fn what_one_publisher_sends_is_none_of_two() {
+        let own = recorded(10, position);
+        assert!(refused(&own).is_none(), "the same robot twice");
+        // The last digit, in rad and in degrees; a joint that waits at the end of a turn; some readings that failed.
+        let flickers = |digit: f64, factor: f64| {
+            let at = |k: i64| factor * position(k * 10 * MS) + if (k * 7919) % 5 == 0 { digit } else { 0.0 };
+            (0..2000).map(|k| sample(k * 10 * MS, at(k), "arm")).collect::<Vec<_>>()
+        };
+        assert!(refused(&flickers(1e-4, 1.0)).is_none());
+        assert!(refused(&flickers(0.01, 1f64.to_degrees())).is_none());
+        assert!(refused(&flickers(-std::f64::consts::TAU, 1.0)).is_none());
+        let mut failed = own.clone();
+        (0..9).for_each(|k| failed[100 + 200 * k].positions[0] = 57.0);
+        assert!(refused(&failed).is_none());
+        // A joint that turns back again and again.
+        let shakes = (0..2000).map(|k| sample(k * 10 * MS, 0.1 * (k as f64 * 0.6).sin(), "arm")).collect::<Vec<_>>();
+        assert!(refused(&shakes).is_none());
+    }
+}
