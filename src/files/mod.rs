@@ -3,6 +3,7 @@
 pub mod jpeg;
 mod picture;
 mod tiff;
+mod word;
 
 use std::fs::File;
 use std::io::Read;
@@ -11,6 +12,7 @@ use std::path::Path;
 pub use picture::{
     MOST_SIDE_PX, batches, decode_picture, decoded_bytes, is_turned_by_viewers, is_whole, page_of, picture_size,
 };
+pub use word::word;
 
 use crate::error::{Code, Error, Result};
 

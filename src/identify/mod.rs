@@ -47,7 +47,7 @@ pub use model_choice::lens_choice::{choose_lens, depths_m};
 pub use observations::detections::{
     SeenSeries, Unused, detect_images, detect_stops, flat_field_drift, pictures, require_some,
 };
-pub use observations::measure::{MeasuredWithNotices, measure, measure_bodies};
+pub use observations::measure::{MeasuredWithNotices, image_size, measure, measure_bodies};
 pub use observations::seen_image::SeenImage;
 pub use observations::stated::CameraStart;
 pub use observations::together::bring_together;

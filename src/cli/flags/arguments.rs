@@ -1,8 +1,15 @@
 //! The arguments of the process.
 
+use crate::files::word;
+
 /// Words of the command line as they can be shown: a path may hold bytes that are no text.
 pub fn command_line() -> Vec<String> {
     std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect()
+}
+
+/// The command line, to be given again.
+pub(super) fn command_text() -> String {
+    command_line().iter().map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// Two numbers with an x between them.

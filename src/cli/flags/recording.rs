@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 
 use crate::error::{Code, Error, Result};
+use crate::files::word;
 use crate::series::{Clock, Motion, Picking, RecordingOptions};
 
 /// Flags that say how a recording is read.
@@ -73,5 +74,20 @@ impl RecordingArgs {
             picking: if self.picture == PickingName::Average { Picking::Average } else { Picking::Sharpest },
             ..RecordingOptions::default()
         })
+    }
+
+    /// The flags as they are given, to be given to another command.
+    pub(super) fn given(&self) -> String {
+        let topic = |flag: &str, topic: &Option<String>| topic.as_ref().map(|t| format!(" --{flag} {}", word(t)));
+        let seconds = |flag: &str, seconds: Option<f64>| seconds.map(|s| format!(" --{flag} {s}"));
+        let parts = [
+            topic("joint-topic", &self.joint_topic),
+            topic("image-topic", &self.image_topic),
+            (self.clock == ClockName::Log).then(|| " --clock log".to_owned()),
+            seconds("image-delay", self.image_delay),
+            (self.picture == PickingName::Average).then(|| " --picture average".to_owned()),
+            seconds("in-motion", self.in_motion),
+        ];
+        parts.into_iter().flatten().collect()
     }
 }

@@ -140,7 +140,7 @@ fn write(args: &DetectArgs, looked: &Looked, place: ResultFolder) -> Result<usiz
         plate: &looked.plate,
         series: looked.series.as_ref(),
         inputs: looked.inputs.clone(),
-        command: crate::cli::command_line().join(" "),
+        command: crate::cli::command_text(),
         pictures: drawable.iter().map(|(_, _, name)| (*name).clone()).collect(),
     };
     let files = detection_files(&looked.images, &context)?;

@@ -81,7 +81,7 @@ pub fn run(args: &PosesArgs) -> Result<Verdict> {
     notices.extend(args.cameras.apply(&mut measured)?);
     let found = stand_alone(&measured, &limits)?;
     notices.extend(found.notices.iter().cloned());
-    let command = crate::cli::command_line().join(" ");
+    let command = crate::cli::command_text();
     let against = args.against.as_deref().map(|path| Ok((path.display().to_string(), against::compare(&found, path)?)));
     let against = against.transpose()?;
     let notices = Notice::said_once(&notices);

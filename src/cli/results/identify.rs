@@ -168,7 +168,7 @@ fn write(
     at: Option<&AtTable<'_>>,
 ) -> Result<Verdict> {
     let poses = if args.poses { Poses::Written } else { Poses::LeftOut };
-    let command = crate::cli::command_line().join(" ");
+    let command = crate::cli::command_text();
     let folder = place.path().to_path_buf();
     let result = place.begin()?;
     calibration.write(&Export { offsets: args.offsets.into(), poses, command }, &result)?;

@@ -8,6 +8,7 @@ use crate::assess::Advice;
 use crate::cli::terminal::paragraph::{WIDTH, indented, paragraph};
 use crate::diagnose::Subject;
 use crate::error::Code;
+use crate::files::word;
 use crate::output::parameter_words::MOST_NEXT;
 use crate::output::solution_json::SolutionRecord;
 use crate::output::verdict::{Trust, Verdict, VerdictReason};
@@ -39,7 +40,7 @@ pub fn text(record: &SolutionRecord, folder: &Path) -> String {
     lines.push(results(record, folder));
     if lines.len() < MOST_LINES {
         let file = folder.join(crate::output::solution_json::FILE_NAME);
-        lines.push(indented("more", &format!("robotcal show --all {}", file.display())));
+        lines.push(indented("more", &format!("robotcal show --all {}", word(file.display()))));
     }
     lines.into_iter().map(|line| line + "\n").collect()
 }

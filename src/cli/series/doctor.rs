@@ -6,15 +6,16 @@ use clap::Args;
 use rayon::prelude::*;
 
 use crate::assess::Limits;
-use crate::calibration::{Ends, Inputs};
+use crate::calibration::{Ends, Inputs, Pictures};
 use crate::cli::Verdict;
+use crate::cli::flags::recording::RecordingArgs;
 use crate::cli::terminal::paragraph::paragraph;
 use crate::cli::terminal::say::say_line;
 use crate::detect::load;
 use crate::error::{Code, Error, Notice, Result};
-use crate::files::{is_whole, picture_size};
-use crate::identify::readings_of;
-use crate::series::{self, Series, Source};
+use crate::files::{is_whole, picture_size, word};
+use crate::identify::{image_size, readings_of};
+use crate::series::{self, RecordingOptions, Series, Source};
 
 /// Most lines of a notice.
 const MOST_LINES: usize = 6;
@@ -28,6 +29,8 @@ pub struct DoctorArgs {
     /// Robot description (URDF): also tries whether joint names and readings fit it
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
+    #[command(flatten)]
+    recording: RecordingArgs,
 }
 
 /// What was looked at, and what was found of it.
@@ -53,18 +56,20 @@ impl Examination {
 }
 
 pub fn run(args: &DoctorArgs) -> Result<Verdict> {
+    let options = args.recording.options(&[])?;
     let mut seen = Examination::default();
     files_of(&args.series, &mut seen);
     if seen.missing.is_empty() {
         match series::read(&args.series) {
-            Ok(series) => examine(&series, args, &mut seen),
+            Ok(series) => examine(series, args, &options, &mut seen),
             Err(error) => seen.missing(error),
         }
     }
     match seen.missing.first() {
         None => {
-            let urdf = args.urdf.as_ref().map_or("robot.urdf".to_owned(), |f| f.display().to_string());
-            say_line!("ready     robotcal identify --urdf {urdf} --series {}", args.series.display());
+            let urdf = args.urdf.as_ref().map_or("robot.urdf".to_owned(), |f| word(f.display()));
+            let series = word(args.series.display());
+            say_line!("ready     robotcal identify --urdf {urdf} --series {series}{}", args.recording.given());
             Ok(Verdict::Good)
         }
         Some(first) => {
@@ -119,22 +124,29 @@ fn files_of(folder: &Path, seen: &mut Examination) {
     }
 }
 
-fn examine(series: &Series, args: &DoctorArgs, seen: &mut Examination) {
+fn examine(series: Series, args: &DoctorArgs, options: &RecordingOptions, seen: &mut Examination) {
     let manifest = series.manifest_file();
     let manifest = manifest.file_name().map_or_else(|| "series.toml".into(), |name| name.to_string_lossy());
     seen.good(&manifest, &format!("plate of {} markers", series.plate.markers.len()));
+    // Pictures of a recording are looked at, too.
+    let pictures = Pictures::new();
+    let series = match with_stops(series, &pictures, args, options) {
+        Ok(series) => series,
+        Err(error) => return seen.missing(error),
+    };
     match &series.source {
-        Source::Recording(path) => {
-            seen.good("recording", &format!("{}; stops are taken out by identify", path.display()))
-        }
+        Source::Recording(_) => {}
         Source::Observations(all) => seen.good("observations.csv", &format!("{} images", all.len())),
         Source::Cameras(views) => {
             seen.good("images.csv", &format!("{} cameras at the same stops", views.len()));
-            views.iter().for_each(|view| images(view, seen));
+            views
+                .iter()
+                .filter(|view| matches!(view.source, Source::Images { .. }))
+                .for_each(|view| images(view, seen));
         }
         Source::NoImages => seen.good("measurements", "of the tip in space, without images"),
         Source::Images { dark, white, .. } => {
-            images(series, seen);
+            images(&series, seen);
             for (name, files) in [("dark/", dark), ("white/", white)] {
                 if !files.is_empty() {
                     seen.good(name, &format!("{} images for the flat field", files.len()));
@@ -142,15 +154,37 @@ fn examine(series: &Series, args: &DoctorArgs, seen: &mut Examination) {
             }
         }
     }
-    series.notices.iter().for_each(|n| seen.note(n));
-    if !matches!(series.source, Source::Recording(_)) {
-        stops(series, seen);
+    for view in series.views().iter().filter(|view| matches!(view.source, Source::Observations(_))) {
+        image_size(view, None).err().into_iter().for_each(|error| seen.missing(error));
     }
+    series.notices.iter().for_each(|n| seen.note(n));
+    stops(&series, seen);
     if let Some(urdf) = &args.urdf
-        && let Err(error) = robot(series, urdf, seen)
+        && let Err(error) = robot(&series, urdf, seen)
     {
         seen.missing(error);
     }
+}
+
+/// The series as it is identified: a recording with its stops, for the joints of the robot where that is given.
+fn with_stops(series: Series, pictures: &Pictures, args: &DoctorArgs, options: &RecordingOptions) -> Result<Series> {
+    if !matches!(series.source, Source::Recording(_)) {
+        return Ok(series);
+    }
+    let options = match &args.urdf {
+        None => options.clone(),
+        Some(urdf) => {
+            let inputs = Inputs::with_series(urdf, vec![series.clone()], Ends::default())?;
+            options.clone().of_chain(&inputs.chain)
+        }
+    };
+    let read = pictures.of_recordings(vec![series.clone()], &options);
+    let of_joints = |e: &Error| e.code == Code::TopicAmbiguous && args.urdf.is_none() && e.remedy.contains("--joint");
+    let mut all = read.map_err(|e| match of_joints(&e) {
+        true => Error { remedy: format!("{}, or give --urdf: the joints of the robot choose", e.remedy), ..e },
+        false => e,
+    })?;
+    Ok(all.pop().unwrap_or(series))
 }
 
 /// All pictures can be opened, and have one size.
@@ -192,13 +226,18 @@ fn size_of(path: &Path) -> Result<(u32, u32)> {
 
 fn stops(series: &Series, seen: &mut Examination) {
     let (all, few) = (series.stops.stops.len(), Limits::default().few_images);
-    match all < few {
-        false if series.controller.is_some() => seen.good("controller.csv", &format!("{all} stops with their poses")),
-        false => seen.good("joints.csv", &format!("{all} stops, joints {}", series.stops.joints.join(", "))),
-        true => {
-            let remedy = "take 30 to 50 stops that move every joint through its range";
-            seen.note(&Notice::new(Code::FewImages, "joints.csv", format!("{all} stops are few"), remedy));
-        }
+    let name = match series.manifest.mcap {
+        Some(_) => "recording",
+        None if series.controller.is_some() => "controller.csv",
+        None => "joints.csv",
+    };
+    if all < few {
+        let remedy = "take 30 to 50 stops that move every joint through its range";
+        return seen.note(&Notice::new(Code::FewImages, name, format!("{all} stops are few"), remedy));
+    }
+    match name {
+        "controller.csv" => seen.good(name, &format!("{all} stops with their poses")),
+        _ => seen.good(name, &format!("{all} stops, joints {}", series.stops.joints.join(", "))),
     }
 }
 
@@ -209,9 +248,6 @@ fn robot(series: &Series, file: &Path, seen: &Examination) -> Result<()> {
     let moving = chain.readings.join(", ");
     seen.good("urdf", &format!("{} ({} to {}; {moving})", description.name, chain.base, chain.tip));
     tip_notice.iter().chain(&description.notices).for_each(|n| seen.note(n));
-    if matches!(series.source, Source::Recording(_)) {
-        return Ok(());
-    }
     let readings = readings_of(series, &chain)?;
     series.reading_notices(&chain).iter().for_each(|n| seen.note(n));
     seen.good("readings", &format!("{} stops with a value for every joint", readings.iter().flatten().count()));

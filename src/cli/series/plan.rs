@@ -18,6 +18,7 @@ use crate::cli::flags::robot::{noted_chain, read_chain, refuse_degrees};
 use crate::cli::results::show::read_solution;
 use crate::cli::terminal::say::{say, say_line};
 use crate::error::{Code, Error, Result};
+use crate::files::word;
 use crate::geom::{OrientedBox, Pose};
 use crate::identify::RobotModel;
 use crate::model::camera::Camera;
@@ -217,7 +218,7 @@ pub fn run(args: &PlanArgs) -> Result<Verdict> {
     }
     forecast.words.extend(words);
     check_demand(&request, &forecast)?;
-    let command: Vec<String> = crate::cli::command_line().into_iter().skip(1).collect();
+    let command: Vec<String> = crate::cli::command_line().iter().skip(1).map(word).collect();
     let command = format!("robotcal {}", command.join(" "));
     let mut more = plan_programs::programs(&request, &plan);
     more.insert("plan.html".into(), plan_html(&request, &plan, &forecast, &command).into_bytes());

@@ -95,8 +95,7 @@ pub(super) fn run(
     let files = files.map(|(name, text)| (name.to_owned(), text.into_bytes()));
     let stops: Vec<TouchStop> =
         planned.iter().enumerate().map(|(k, t)| TouchStop { stop: stop(k), readings: t.readings.clone() }).collect();
-    let command = crate::cli::command_line().join(" ");
-    place.write_all(&touch_files(files.into(), (&chain.readings, &stops), &command)?)?;
+    place.write_all(&touch_files(files.into(), (&chain.readings, &stops), &crate::cli::command_text())?)?;
     say!("{}", text(&planned, (&request, fewest), &robot, out));
     if entered_offsets(&record)?.iter().any(|offset| *offset != 0.0) {
         say_line!("readings  the joint values are those of the controller with the offsets of mastering.csv entered");

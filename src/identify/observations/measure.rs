@@ -84,14 +84,7 @@ pub fn measure(
             (stop.image.as_str(), s.observations.len(), unused)
         }),
     )?;
-    let (width_px, height_px) = found_size.or(camera.size_px()).ok_or_else(|| {
-        Error::new(
-            Code::SettingMissing,
-            series.manifest_file().display(),
-            "the size of the images is not known: there are observations and no images",
-            "state width_px and height_px under [camera]",
-        )
-    })?;
+    let size_px = image_size(series, found_size)?;
     let mut stops = Vec::with_capacity(readings.len());
     for (k, ((stop, readings), seen)) in series.stops.stops.iter().zip(readings).zip(seen.drain(..)).enumerate() {
         let placement = placement_of(series, &stop.placement, several);
@@ -101,9 +94,24 @@ pub fn measure(
     }
     // The detector measures centroids, whatever observations would mean.
     let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
-    let measured = measured_series(series, lens, (width_px, height_px), centroid, stops);
+    let measured = measured_series(series, lens, size_px, centroid, stops);
     let postures = other_postures(series, chain, &measured.stops);
     Ok(MeasuredWithNotices { series: MeasuredSeries { plate, bodies, lengths, postures, ..measured }, notices })
+}
+
+/// Width and height of the images of one camera: those of its images, else as stated, px.
+///
+/// # Errors
+/// Observations without images whose size is not stated.
+pub fn image_size(series: &Series, found: Option<(u32, u32)>) -> Result<(u32, u32)> {
+    found.or(series.manifest.camera().size_px()).ok_or_else(|| {
+        Error::new(
+            Code::SettingMissing,
+            series.manifest_file().display(),
+            "the size of the images is not known: there are observations and no images",
+            "state width_px and height_px under [camera]",
+        )
+    })
 }
 
 /// What was measured in space alone: touches, and what a tracker saw. Images are not looked at.
