@@ -1,5 +1,6 @@
 //! Does the camera model explain the images, with a pose of its own for every one of them?
 
+use super::given_camera::GivenCamera;
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
 use crate::problem::Problem;
@@ -9,6 +10,8 @@ use crate::problem::Problem;
 pub struct CameraModelMisfit {
     /// RMS of the lengths of their residuals, px per point.
     pub rms_px: f64,
+    /// Whether a camera was given.
+    pub given: GivenCamera,
 }
 
 /// Looks at what is left beside the noise that is stated of the observations.
@@ -17,7 +20,8 @@ pub(super) fn check(problem: &Problem, setting: &CheckContext) -> Option<CameraM
     let variances = problem.used().flat_map(|(_, image)| image.used()).map(|o| o.stated_variance_px2());
     let (sum, count) = variances.fold((0.0, 0.0f64), |(sum, count), v| (sum + v, count + 1.0));
     let unexplained = rms_px.powi(2) - sum / count.max(1.0);
-    (unexplained > setting.limits.free_rms_px.powi(2)).then_some(CameraModelMisfit { rms_px })
+    (unexplained > setting.limits.free_rms_px.powi(2))
+        .then(|| CameraModelMisfit { rms_px, given: GivenCamera::of(setting.series, None) })
 }
 
 impl Kind for CameraModelMisfit {
@@ -45,6 +49,7 @@ impl Kind for CameraModelMisfit {
     }
 
     fn remedy(&self) -> String {
-        "try --camera auto, and check that plate.toml describes the plate in the images".into()
+        let camera = self.given.remedy().unwrap_or("try --camera auto");
+        format!("{camera}, and check that plate.toml describes the plate in the images")
     }
 }

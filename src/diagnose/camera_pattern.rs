@@ -1,10 +1,12 @@
 //! Is there a pattern in the residuals that noise does not explain, what would remove it, and does it matter?
 
+use super::given_camera::GivenCamera;
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::{Accuracy, Bearer, Limits, Pattern, PatternEffect, PatternTest, cause, patterns};
 use crate::error::Code;
 use crate::fit::Fit;
 use crate::model::camera::Lens;
+use crate::problem::MeasuredSeries;
 
 /// The residuals show a pattern.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,10 +23,12 @@ pub struct ResidualPattern {
     pub has_field: bool,
     /// Lenses that were tried for the camera and have less evidence than the one that was taken.
     pub tried: Vec<Lens>,
+    /// Whether the camera was given.
+    pub given: GivenCamera,
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<ResidualPattern> {
-    residual_pattern(fit, setting.limits)
+    residual_pattern(fit, setting.limits).map(|pattern| pattern.given_by(setting.series))
 }
 
 /// The pattern that names the cause, where there is one.
@@ -38,7 +42,7 @@ pub fn residual_pattern(fit: &Fit, limits: &Limits) -> Option<ResidualPattern> {
     let matters = found.moved.is_some_and(|m| m.sigmas() > limits.pattern_moves);
     let is_fitted = matches!(found.bearer, Bearer::Camera(k) if found.pattern.is_fitted(fit, k));
     let has_field = matches!(found.bearer, Bearer::Camera(k) if fit.state.cameras[k].lens.has_field());
-    Some(ResidualPattern { found, bearer, matters, is_fitted, has_field, tried: Vec::new() })
+    Some(ResidualPattern { found, bearer, matters, is_fitted, has_field, tried: Vec::new(), given: GivenCamera::Not })
 }
 
 /// What it looks like, and what removes it.
@@ -66,6 +70,16 @@ fn words(pattern: Pattern) -> [&'static str; 2] {
 }
 
 impl ResidualPattern {
+    /// The same, where these series say whether its camera was given.
+    #[must_use]
+    pub fn given_by(self, series: &[MeasuredSeries]) -> Self {
+        let given = match self.found.bearer {
+            Bearer::Camera(_) => GivenCamera::of(series, Some(&self.bearer)),
+            Bearer::Plate(_) => GivenCamera::Not,
+        };
+        Self { given, ..self }
+    }
+
     /// The lens that the remedy would name.
     fn remedy_lens(&self) -> Option<Lens> {
         match self.found.bearer {
@@ -151,6 +165,9 @@ impl Kind for ResidualPattern {
     }
 
     fn remedy(&self) -> String {
+        if let Some(remedy) = self.given.remedy() {
+            return remedy.into();
+        }
         match self.is_fitted {
             _ if self.has_field => {
                 "no lens of this program has it beside a displacement field: nothing to do while the flange moves by less than its sigma".into()

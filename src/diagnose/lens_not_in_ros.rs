@@ -1,5 +1,6 @@
 //! Can camera.yaml express the lens that was found?
 
+use super::given_camera::GivenCamera;
 use super::kind::{Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 
@@ -12,6 +13,8 @@ pub struct LensNotInRos {
     pub lens: &'static str,
     /// What is lost over the image, RMS and at most, px; none where no lens of ROS comes near, and there is no camera.yaml.
     pub loss_px: Option<[f64; 2]>,
+    /// Whether the camera was given: then the lens is that of its file.
+    pub given: GivenCamera,
 }
 
 impl Kind for LensNotInRos {
@@ -49,6 +52,7 @@ impl Kind for LensNotInRos {
 
     fn remedy(&self) -> String {
         match self.loss_px {
+            _ if self.given != GivenCamera::Not => "the lens is that of --camera-file; solution.json has it itself, and robotcal convert writes it in a format that holds it".into(),
             Some(_) => "solution.json has the lens itself; --camera ros identifies one that camera.yaml can express".into(),
             None => "solution.json has the lens itself, and robotcal convert writes it in a format that holds it; --camera ros identifies one that camera.yaml can express".into(),
         }

@@ -12,7 +12,7 @@ use std::path::Path;
 pub use picture::{
     MOST_SIDE_PX, batches, decode_picture, decoded_bytes, is_turned_by_viewers, is_whole, page_of, picture_size,
 };
-pub use word::word;
+pub use word::{folder_of, word};
 
 use crate::error::{Code, Error, Result};
 

@@ -1,6 +1,7 @@
-//! Names as words of a command line, to be copied from there.
+//! Names as they are given on a command line, and to be copied to one.
 
 use std::fmt::Display;
+use std::path::Path;
 
 /// A name as one word of a shell: in quotes where it needs them.
 pub fn word(name: impl Display) -> String {
@@ -13,9 +14,20 @@ pub fn word(name: impl Display) -> String {
     }
 }
 
+/// The folder of a file that is named: the present one where its name stands alone.
+pub fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::word;
+    use super::*;
+
+    #[test]
+    fn a_name_alone_is_in_the_present_folder() {
+        let of = ["new.html", "a/new.html", "/new.html"].map(|file| folder_of(Path::new(file)));
+        assert_eq!(of, [".", "a", "/"].map(Path::new));
+    }
 
     #[test]
     fn names_with_blanks_stand_in_quotes() {

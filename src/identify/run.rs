@@ -66,7 +66,7 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
         solution.findings.push(tool.into());
     }
     name_tried_lenses(&mut solution);
-    let losses = lens_choice::losses(&solution.fit.adjustment, &solution.free_poses);
+    let losses = lens_choice::losses(&solution.fit.adjustment, &solution.free_poses, series);
     solution.findings.extend(losses.into_iter().map(Into::into));
     Ok(Solution { options: options.clone(), ..solution })
 }

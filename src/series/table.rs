@@ -253,7 +253,17 @@ impl Table {
 
 const OTHER_SEPARATOR: &str = "save it with commas between columns and decimal points (spreadsheet language: English)";
 
-/// A table separated by semicolons or tabs is named as such instead of read as one column.
+/// Whether blanks separate the columns: every line has as many words as there are names, and some of them are numbers.
+fn are_blanks<'a>(first: &str, lines: impl Iterator<Item = &'a str>) -> bool {
+    let count = first.split_whitespace().count();
+    let number = |word: &str| word.replace(',', ".").parse::<f64>().is_ok();
+    let mut rows = lines.filter(|line| !line.trim().is_empty()).peekable();
+    count > 1
+        && rows.peek().is_some()
+        && rows.all(|line| line.split_whitespace().count() == count && line.split_whitespace().any(number))
+}
+
+/// A table separated by semicolons, tabs or blanks is named as such instead of read as one column.
 fn refuse_other_separators(file: &str, text: &str) -> Result<()> {
     let mut lines = text.lines();
     let first = lines.next().unwrap_or_default();
@@ -266,6 +276,7 @@ fn refuse_other_separators(file: &str, text: &str) -> Result<()> {
     let (separator, name) = match (first.contains(','), first.contains(';'), first.contains('\t')) {
         (false, true, _) => (';', "semicolons"),
         (false, _, true) => ('\t', "tabs"),
+        (false, ..) if are_blanks(first, lines.clone()) => (' ', "blanks"),
         _ => return Ok(()),
     };
     let comma =

@@ -136,6 +136,8 @@ fn a_bad_joint_table_names_line_and_column() {
     let german = "image;j1;j2;x\na.png;0,1;1,25;0,5\n";
     assert_says(&with(german), Code::CsvSeparator, &["joints.csv:1", "semicolons"]);
     assert_says(&with(&german.replace(';', "\t")), Code::CsvSeparator, &["joints.csv:1", "tabs"]);
+    // As the recorder of Universal Robots writes it.
+    assert_says(&with(&german.replace(';', " ").replace(',', ".")), Code::CsvSeparator, &["joints.csv:1", "blanks"]);
     let mixed = "image,j1,j2,x\na.png;0,1;1,25;0,5\n";
     assert_says(&with(mixed), Code::CsvSeparator, &["joints.csv:2"]);
     assert_says(&with(&mixed.replace(",5", "")), Code::CsvSeparator, &["joints.csv:2"]);

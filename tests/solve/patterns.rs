@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use robotcal::assess::{Limits, Pattern, cause, patterns};
-use robotcal::diagnose::{Finding, ResidualPattern, residual_pattern};
+use robotcal::diagnose::{Finding, GivenCamera, ResidualPattern, residual_pattern};
 use robotcal::fit::Fit;
 use robotcal::identify::{Options, RobotModel, Solution, identify, stand_alone};
 use robotcal::model::camera::{Camera, Lens};
@@ -143,7 +143,7 @@ fn a_lens_with_terms_of_the_fault_is_fitted() {
     }
 }
 
-/// A remedy names no lens that is there, nor one that was tried and has less evidence.
+/// A remedy names no lens that is there, nor one that was tried and has less evidence, nor any beside the file of a camera.
 #[test]
 fn a_lens_that_was_taken_or_tried_is_not_the_remedy() {
     let limits = Limits::default();
@@ -151,13 +151,16 @@ fn a_lens_that_was_taken_or_tried_is_not_the_remedy() {
         residual_pattern(&stand_alone(&[seen(&world(Fault::ThinPrism(8e-3), 4))], &limits).unwrap().fit, &limits);
     let found = found.unwrap();
     let [name, field] = ["thin_prism", "brown+field"];
-    for (is_fitted, tried, named) in [
-        (false, vec![], Some(name)),
-        (true, vec![], Some(field)),
-        (false, vec![Lens::ThinPrism], None),
-        (true, vec![Lens::BrownField], None),
+    let not = GivenCamera::Not;
+    for (is_fitted, tried, given, named) in [
+        (false, vec![], not, Some(name)),
+        (true, vec![], not, Some(field)),
+        (false, vec![Lens::ThinPrism], not, None),
+        (true, vec![Lens::BrownField], not, None),
+        (false, vec![], GivenCamera::Start, None),
+        (true, vec![], GivenCamera::Held, None),
     ] {
-        let remedy = Finding::from(ResidualPattern { is_fitted, tried, ..found.clone() }).remedy();
+        let remedy = Finding::from(ResidualPattern { is_fitted, tried, given, ..found.clone() }).remedy();
         for lens in [name, field] {
             // words: the remedy is what the user follows, and names lenses
             assert_eq!(remedy.contains(lens), named == Some(lens), "{remedy}");

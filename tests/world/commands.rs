@@ -200,6 +200,34 @@ fn doctor_takes_a_folder_of_a_recording_without_metadata_as_one() {
     .unwrap();
     let stated = robotcal(&["doctor", bag.to_str().unwrap()]);
     assert_eq!(stated.status.code(), Some(0), "{}", text(&stated));
+    // It takes the stops out as identify does, with the same flags.
+    let other = robotcal(&["doctor", bag.to_str().unwrap(), "--image-topic", "/camera/other"]);
+    assert_eq!(other.status.code(), Some(2));
+    assert_says(&text(&other), Code::TopicMissing, &["/camera/other"]);
+    let by_log = robotcal(&["doctor", bag.to_str().unwrap(), "--clock", "log"]);
+    assert_eq!(by_log.status.code(), Some(0), "{}", text(&by_log));
+    assert!(text(&by_log).contains("--clock log"), "{}", text(&by_log));
+}
+
+/// Observations do not tell how large the images were.
+#[test]
+fn doctor_misses_the_size_of_images_that_are_not_there_and_quotes_names_with_blanks() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = folder.path().join("my run");
+    std::fs::create_dir(&run).unwrap();
+    for name in ["joints.csv", "observations.csv", "plate.csv", "plate.toml"] {
+        std::fs::copy(root(&format!("datasets/ur10e_observations/{name}")), run.join(name)).unwrap();
+    }
+    let manifest = std::fs::read_to_string(Path::new(&root("datasets/ur10e_observations/series.toml"))).unwrap();
+    let without: String = manifest.lines().filter(|l| !l.contains("_px")).map(|l| format!("{l}\n")).collect();
+    std::fs::write(run.join("series.toml"), without).unwrap();
+    let unstated = robotcal(&["doctor", run.to_str().unwrap()]);
+    assert_eq!(unstated.status.code(), Some(2));
+    assert_says(&text(&unstated), Code::SettingMissing, &["width_px", "height_px"]);
+    std::fs::write(run.join("series.toml"), manifest).unwrap();
+    let stated = robotcal(&["doctor", run.to_str().unwrap()]);
+    assert_eq!(stated.status.code(), Some(0), "{}", text(&stated));
+    assert!(text(&stated).contains(&format!("\"{}\"", run.display())), "{}", text(&stated));
 }
 
 #[test]
@@ -210,6 +238,34 @@ fn doctor_says_that_a_bag_of_ros_1_must_be_converted() {
     let output = robotcal(&["doctor", bag.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(2), "{}", text(&output));
     assert_says(&text(&output), Code::RecordingFormat, &["run1.bag", "rosbags-convert"]);
+}
+
+#[test]
+fn camera_files_of_other_programs_that_are_not_read_are_named_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("camera.yml");
+    for (name, bytes) in [
+        ("stereo.mat", &b"MATLAB 5.0 MAT-file, Platform: GLNXA64\0\xff\xfe"[..]),
+        ("calib.json", b"{\"Calibration\": {\"cameras\": []}}"),
+    ] {
+        let file = folder.path().join(name);
+        std::fs::write(&file, bytes).unwrap();
+        let output = robotcal(&["convert", file.to_str().unwrap(), out.to_str().unwrap(), "--as", "opencv"]);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert_says(&text(&output), Code::SettingSyntax, &[name]);
+    }
+}
+
+#[test]
+fn a_report_may_be_named_without_a_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let solution = root("reports/kr6_small/solution.json");
+    let output = Command::new(env!("CARGO_BIN_EXE_robotcal"))
+        .args(["show", &solution, "--report", "new.html"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(folder.path().join("new.html").is_file(), "{}", text(&output));
 }
 
 #[test]

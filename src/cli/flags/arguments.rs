@@ -8,7 +8,7 @@ pub fn command_line() -> Vec<String> {
 }
 
 /// The command line, to be given again.
-pub(super) fn command_text() -> String {
+pub fn command_text() -> String {
     command_line().iter().map(word).collect::<Vec<_>>().join(" ")
 }
 

@@ -33,6 +33,10 @@ impl CameraArgs {
     /// # Errors
     /// Lenses that are not known, files that cannot be read or are of another camera.
     pub fn apply(&self, series: &mut [MeasuredSeries]) -> Result<Vec<Notice>> {
+        if self.camera.is_some() {
+            // A series of an earlier solution may have the camera of a file.
+            series.iter_mut().for_each(|s| s.known_camera = None);
+        }
         match self.camera.as_deref() {
             Some(AUTO) => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::All),
             Some(ROS) => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::Exported),
@@ -55,9 +59,9 @@ impl CameraArgs {
         let (name, path) = match given.split_once('=') {
             Some((name, path)) if names.iter().any(|n| n == name) => (name.to_owned(), PathBuf::from(path)),
             _ => match &names[..] {
-                [only] => (only.clone(), PathBuf::from(given)),
+                [only] if !names_another(given) => (only.clone(), PathBuf::from(given)),
                 _ => {
-                    let what = format!("\"{given}\" does not say which camera: there are {}", names.join(", "));
+                    let what = format!("\"{given}\" does not say which camera of {}", names.join(", "));
                     return Err(Error::new(
                         Code::OptionRange,
                         "--camera-file",
@@ -83,6 +87,12 @@ impl CameraArgs {
         }
         Ok(lost.map(|lost| Notice::new(Code::LensChosen, path.display(), lost, "")))
     }
+}
+
+/// Whether a file that is there stands behind a name.
+fn names_another(given: &str) -> bool {
+    let behind = given.split_once('=').map(|(_, path)| camera_in_file(PathBuf::from(path)).0);
+    !Path::new(given).exists() && behind.is_some_and(|path| path.exists())
 }
 
 /// Beside the lenses, those that the data choose.
@@ -159,6 +169,15 @@ cam1:
         assert!([AUTO, ROS, "brown"].iter().all(|name| refused.remedy.contains(name)), "{}", refused.remedy);
     }
 
+    #[test]
+    fn a_lens_that_is_named_takes_the_place_of_a_camera_that_was_given_before() {
+        let args = CameraArgs { camera: Some("brown".into()), camera_file: Vec::new(), hold_camera: false };
+        let camera = crate::model::camera::Camera::pinhole(crate::model::camera::Lens::Fisheye, 1280, 1024, 900.0);
+        let mut all = [MeasuredSeries { known_camera: Some(KnownCamera { camera, held: true }), ..series("front") }];
+        args.apply(&mut all).unwrap();
+        assert_eq!((all[0].known_camera.is_none(), all[0].lens.name()), (true, "brown"));
+    }
+
     /// Kalibr calls its cameras cam0 and cam1, whatever they are called in series.toml.
     #[test]
     fn cameras_of_a_camchain_are_named_behind_the_file() {
@@ -169,6 +188,9 @@ cam1:
         let both = [of("left=FILE#cam1"), of("right=FILE#cam0")];
         assert_eq!(focal_lengths(&both, &["left", "right"]).unwrap(), [800.0, 1100.0]);
         assert_eq!(focal_lengths(&[of("FILE#cam1")], &["front"]).unwrap(), [800.0]);
+        for given in ["back=FILE#cam1", "back=FILE"] {
+            assert_eq!(focal_lengths(&[of(given)], &["front"]).unwrap_err().code, Code::OptionRange);
+        }
         for given in ["FILE", "front=FILE", "FILE#cam2"] {
             let refused = focal_lengths(&[of(given)], &["front"]).unwrap_err();
             assert_eq!(refused.code, Code::OptionMissing);

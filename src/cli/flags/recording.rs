@@ -77,7 +77,7 @@ impl RecordingArgs {
     }
 
     /// The flags as they are given, to be given to another command.
-    pub(super) fn given(&self) -> String {
+    pub fn given(&self) -> String {
         let topic = |flag: &str, topic: &Option<String>| topic.as_ref().map(|t| format!(" --{flag} {}", word(t)));
         let seconds = |flag: &str, seconds: Option<f64>| seconds.map(|s| format!(" --{flag} {s}"));
         let parts = [

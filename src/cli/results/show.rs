@@ -72,7 +72,7 @@ pub fn run(args: &ShowArgs) -> Result<Verdict> {
     if let Some(file) = &args.report {
         let page = report_html(&first, &Thumbnails::of_files(first.photogrammetry()));
         let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        let folder = file.parent().unwrap_or(Path::new("."));
+        let folder = files::folder_of(file);
         write_beside(folder, &[(name, page.as_bytes())], &args.solutions)?;
     }
     if let Some(folder) = &args.figures {

@@ -12,7 +12,7 @@ use crate::cli::flags::robot::read_chain;
 use crate::cli::results::show::read_solution;
 use crate::cli::terminal::say::{say, say_line};
 use crate::error::{Code, Error, Result};
-use crate::files::picture_size;
+use crate::files::{folder_of, picture_size};
 use crate::model::robot::Robot;
 use crate::output::recording::{MAGNIFIED, overlay};
 use crate::output::{NewFolder, ResultFolder};
@@ -93,7 +93,7 @@ pub fn run(args: &ConvertArgs) -> Result<Verdict> {
 /// A series folder as a recording, with the nominal tip and the observations where there are any; not all of it where images cannot be decoded.
 fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<Verdict> {
     series::require_new(&args.to)?;
-    let folder = args.to.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(&args.to);
     let _tried = ResultFolder::among(folder)?;
     let Some(chain) = chain else {
         let what = "the joints of a series mean nothing without their robot";

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::cli::results::show::read_solution;
 use crate::cli::terminal::say::say_line;
 use crate::error::{Code, Error, Result};
-use crate::files::{self, FileKind};
+use crate::files::{self, FileKind, folder_of};
 use crate::model::camera::{Camera, Lens};
 use crate::output::camera_formats::{
     CameraFormat, OtherLens, camera_text, is_camera_file, loss_words, read_camera_file,
@@ -85,7 +85,7 @@ pub(super) fn run(wanted: &Wanted, format: CameraFormat) -> Result<()> {
     let other = if wanted.nearest { OtherLens::Nearest } else { OtherLens::Refused };
     let written = camera_text(format, (&name, &camera), &depths_m, other)?;
     let name_of_file = wanted.to.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let folder = wanted.to.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(wanted.to);
     write_beside(folder, &[(name_of_file, written.text.as_bytes())], &[wanted.from.to_path_buf()])?;
     say_line!("camera    {name}: {}, written for {}", camera.lens.name(), format.name());
     if let Some(loss_px) = written.loss_px {
@@ -95,7 +95,8 @@ pub(super) fn run(wanted: &Wanted, format: CameraFormat) -> Result<()> {
 }
 
 fn camera(wanted: &Wanted) -> Result<Named> {
-    let all = if wanted.from.extension().is_some_and(|e| e == "json") && !is_camera_file(wanted.from) {
+    let is_json = wanted.from.extension().is_some_and(|e| e == "json");
+    let all = if is_json && !is_camera_file(wanted.from) && !is_of_others(wanted.from)? {
         of_results(wanted.from)?
     } else {
         let read = read_camera_file(wanted.from, wanted.name)?;
@@ -117,6 +118,17 @@ fn camera(wanted: &Wanted) -> Result<Named> {
         let what = format!("has the cameras {}", names.join(", "));
         Error::new(Code::OptionMissing, wanted.from.display(), what, "name one of them with --name")
     })
+}
+
+/// Whether a JSON file is none of this program, as it has neither its format nor cameras.
+fn is_of_others(path: &Path) -> Result<bool> {
+    #[derive(Deserialize)]
+    struct Own {
+        format: Option<serde::de::IgnoredAny>,
+        cameras: Option<serde::de::IgnoredAny>,
+    }
+    let read = serde_json::from_slice::<Own>(&files::read(path, FileKind::Solution)?);
+    Ok(read.is_ok_and(|own| own.format.is_none() && own.cameras.is_none()))
 }
 
 /// Cameras of a solution.json or poses.json.

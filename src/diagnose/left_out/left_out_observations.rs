@@ -1,9 +1,10 @@
 //! Do most observations agree with the others?
 
 use crate::assess::Limits;
+use crate::diagnose::given_camera::GivenCamera;
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject};
 use crate::error::Code;
-use crate::problem::Adjustment;
+use crate::problem::{Adjustment, MeasuredSeries};
 
 /// Many single observations were left out of images in use.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,10 +13,12 @@ pub struct ObservationsLeftOut {
     pub share: f64,
     /// Image that lost the largest share, and this share.
     pub worst: (String, f64),
+    /// Whether a camera was given.
+    pub given: GivenCamera,
 }
 
 pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<ObservationsLeftOut> {
-    observations_left_out(adjustment, setting.limits)
+    observations_left_out(adjustment, setting.limits).map(|found| found.given_by(setting.series))
 }
 
 /// More observations left out than clean images lose.
@@ -30,8 +33,16 @@ pub fn observations_left_out(adjustment: &Adjustment, limits: &Limits) -> Option
         }
     }
     let share = f64::from(out as u32) / f64::from(all.max(1) as u32);
-    let found = ObservationsLeftOut { share, worst: (worst.1.to_owned(), worst.0) };
+    let found = ObservationsLeftOut { share, worst: (worst.1.to_owned(), worst.0), given: GivenCamera::Not };
     (share > limits.share_of_observations_left_out).then_some(found)
+}
+
+impl ObservationsLeftOut {
+    /// The same, where these series say whether a camera was given.
+    #[must_use]
+    pub fn given_by(self, series: &[MeasuredSeries]) -> Self {
+        Self { given: GivenCamera::of(series, None), ..self }
+    }
 }
 
 impl Kind for ObservationsLeftOut {
@@ -57,6 +68,7 @@ impl Kind for ObservationsLeftOut {
     }
 
     fn remedy(&self) -> String {
-        "look for markers taken for others, a bent plate, changed focus".into()
+        let usual = "look for markers taken for others, a bent plate, changed focus";
+        self.given.remedy().map_or_else(|| usual.into(), |camera| format!("{camera}; else {usual}"))
     }
 }

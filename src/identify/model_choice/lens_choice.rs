@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::assess::{Limits, camera_shows_pattern};
-use crate::diagnose::LensNotInRos;
+use crate::diagnose::{GivenCamera, LensNotInRos};
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{FreePoses, NoEvidence, fit_of_outcome, log_evidence_of_fit, log_evidence_of_outcome};
 use crate::identify::joint_fit::fit::{JointFit, fit_model};
@@ -288,12 +288,21 @@ pub fn depths_m(problem: &Problem, free: &FreePoses) -> Vec<[f64; 2]> {
 }
 
 /// What the cameras of ROS cannot say of the lenses that were identified.
-pub(in crate::identify) fn losses(Adjustment { problem, state }: &Adjustment, free: &FreePoses) -> Vec<LensNotInRos> {
+pub(in crate::identify) fn losses(
+    Adjustment { problem, state }: &Adjustment,
+    free: &FreePoses,
+    series: &[MeasuredSeries],
+) -> Vec<LensNotInRos> {
     let named = problem.cameras.iter().zip(&state.cameras).zip(depths_m(problem, free));
     let loss = |((name, camera), depths): ((&String, &Camera), [f64; 2])| {
         let loss_px = camera.in_ros(&depths).map(|fit| [fit.rms_px, fit.worst_px]);
         let (lens, is_in_ros) = (camera.lens.name(), camera.lens.is_in_ros());
-        (!is_in_ros).then(|| LensNotInRos { camera: name.clone(), lens, loss_px })
+        (!is_in_ros).then(|| LensNotInRos {
+            camera: name.clone(),
+            lens,
+            loss_px,
+            given: GivenCamera::of(series, Some(name)),
+        })
     };
     named.filter_map(loss).collect()
 }

@@ -102,11 +102,11 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     diagnosis.after_free_poses(&fit.problem);
     let mut findings = diagnosis.findings();
     findings.extend(many_left_out(&fit.problem, limits).map(Finding::from));
-    findings.extend(observations_left_out(&fit, limits).map(Finding::from));
-    findings.extend(residual_pattern(&fit, limits).map(Finding::from));
+    findings.extend(observations_left_out(&fit, limits).map(|found| found.given_by(&series).into()));
+    findings.extend(residual_pattern(&fit, limits).map(|found| found.given_by(&series).into()));
     findings.extend(tags_off(&fit, limits).into_iter().map(Finding::from));
     findings.extend(uneven_plates(&fit, limits).into_iter().map(Finding::from));
-    let lost = losses(&fit.adjustment, &free_poses).into_iter().filter(|lens| lens.loss_px.is_none());
+    let lost = losses(&fit.adjustment, &free_poses, &series).into_iter().filter(|lens| lens.loss_px.is_none());
     findings.extend(lost.map(Finding::from));
     Ok(StandAlone { fit, free_poses, series, starts, notices, findings })
 }

@@ -153,6 +153,7 @@ pub fn camera_text(
 /// # Errors
 /// Unreadable files, formats and models that are not known, several cameras of which none is named.
 pub fn read_camera_file(path: &Path, wanted: Option<&str>) -> Result<ReadCamera> {
+    refuse_mat(path)?;
     let text = files::read_text(path, FileKind::Settings)?;
     let found = match format_of(path, &text) {
         Some(CameraFormat::Mrcal) => mrcal::read(path, &text)?,
@@ -166,6 +167,20 @@ pub fn read_camera_file(path: &Path, wanted: Option<&str>) -> Result<ReadCamera>
         }
     };
     Ok(found)
+}
+
+/// How the files begin in which MATLAB stores its variables.
+const MAT: &[u8] = b"MATLAB ";
+
+fn refuse_mat(path: &Path) -> Result<()> {
+    let is_named_so = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat"));
+    if !is_named_so && !files::read(path, FileKind::Settings)?.starts_with(MAT) {
+        return Ok(());
+    }
+    let what = "is a MAT-file of MATLAB, which is not read";
+    let remedy = "write its camera into a FileStorage of OpenCV (yaml): camera_matrix, distortion_coefficients, image_width, image_height; \
+                  the centre of the top-left pixel is (0, 0) there, and (1, 1) in MATLAB";
+    Err(Error::new(Code::SettingSyntax, path.display(), what, remedy))
 }
 
 /// True for a camera file of another program.
