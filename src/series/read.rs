@@ -132,7 +132,7 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
             Some(recording) => format!("give the recording that it holds: {}", recording.display()),
             None => format!(
                 "give the folder that holds it; `robotcal doctor {}` says what a series needs",
-                folder.display()
+                files::word(folder.display())
             ),
         };
         return Err(Error::new(Code::SeriesMissing, folder.display(), "holds no series.toml", remedy));

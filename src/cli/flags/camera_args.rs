@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::error::{Code, Error, Notice, Result};
+use crate::files::word;
 use crate::output::camera_formats::{ReadCamera, read_camera_file};
 use crate::problem::{KnownCamera, LensChoice, MeasuredSeries};
 
@@ -115,7 +116,7 @@ fn which(error: Error, name: &str, path: &Path) -> Error {
     if error.code != Code::OptionMissing {
         return error;
     }
-    let remedy = format!("name one of them behind a #: {name}={}#cam0", path.display());
+    let remedy = format!("name one of them behind a #: {}", word(format!("{name}={}#cam0", path.display())));
     Error { remedy, ..error }
 }
 

@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Code, Error, Result};
-use crate::files::{self, FileKind};
+use crate::files::{self, FileKind, word};
 
 /// First bytes of a file, which say what it is.
 pub(super) fn head(path: &Path) -> Result<Vec<u8>> {
@@ -16,7 +16,7 @@ pub(super) fn head(path: &Path) -> Result<Vec<u8>> {
 
 /// Names what a file is instead, with the command that converts it.
 pub(super) fn not_recording(path: &Path, head: &[u8]) -> Error {
-    let shown = path.display();
+    let shown = word(path.display());
     let (what, remedy) = if head.starts_with(b"#ROSBAG V2") {
         let remedy =
             format!("convert it: pip install rosbags; rosbags-convert --src {shown} --dst run1 --dst-storage mcap");
@@ -26,5 +26,5 @@ pub(super) fn not_recording(path: &Path, head: &[u8]) -> Error {
     } else {
         ("is not a recording", "check the file: it begins neither as MCAP nor as sqlite does".to_string())
     };
-    Error::new(Code::RecordingFormat, shown, what, remedy)
+    Error::new(Code::RecordingFormat, path.display(), what, remedy)
 }
