@@ -1,7 +1,7 @@
 //! `robotcal convert`: a recording becomes a series folder, a series folder becomes a recording, a camera goes to another program.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 

@@ -52,7 +52,6 @@ pub fn measure(
     let bodies = seen_bodies(series, several);
     let lengths = seen_lengths(series, several, &bodies)?;
     let mut notices = notices_of(series, chain);
-    let camera = series.manifest.camera();
     let lens = lens_of(series)?;
     let mut plate = series.plate.clone();
     let (mut seen, found_size) = match &series.source {
