@@ -69,7 +69,7 @@ limits! {
     doubtful_share_left_out: f64 = 0.1;
     /// Gain on held-out images, nominal over calibrated, below which a new model is hardly worth installing.
     doubtful_gain: f64 = 1.3;
-    /// Times the RMS held-out error from which a single image asks for a look.
+    /// Times the RMS held-out error, and times what is expected of the image itself, from which a single image asks for a look.
     doubtful_odd_image: f64 = 3.0;
     /// Times the median held-out error from which an image stands out.
     times_usual_error: f64 = 2.5;
