@@ -53,5 +53,6 @@ fn of_image(fit: LinearProblem, left_open: &Covariance, index: usize) -> Option<
     };
     let markers: Vec<f64> = image.used().map(|o| variance(state.plates[image.plate].position(o.marker))).collect();
     let mean = markers.iter().sum::<f64>() / markers.len() as f64;
-    (mean > 0.0).then(|| mean.sqrt())
+    // Of an image whose pose is free, nothing is predicted from readings.
+    (mean > 0.0 && mean.is_finite()).then(|| mean.sqrt())
 }
