@@ -89,20 +89,17 @@ fn from_table(table: &Table, kind: RotationKind) -> Result<(Stops, ControllerPos
 /// Columns of another convention than the one that is stated.
 fn refuse_other_convention(table: &Table, kind: RotationKind) -> Result<()> {
     let has_all = |k: &RotationKind| k.columns().iter().all(|c| table.column(c).is_some());
-    match RotationKind::ALL.iter().find(|k| has_all(k)) {
-        Some(other) if !has_all(&kind) => {
-            let what = format!(
-                "has the columns {} of \"{}\", and series.toml says rotation = \"{}\" ({})",
-                other.columns().join(", "),
-                other.name(),
-                kind.name(),
-                kind.columns().join(", ")
-            );
-            let remedy = format!("write rotation = \"{}\" under [controller] of series.toml", other.name());
-            Err(Error::new(Code::CsvColumnMissing, table.place_of_header(), what, remedy))
-        }
-        _ => Ok(()),
-    }
+    let others: Vec<RotationKind> = RotationKind::ALL.into_iter().filter(has_all).collect();
+    let Some(other) = others.first().filter(|_| !has_all(&kind)) else { return Ok(()) };
+    let names = others.iter().map(|k| format!("\"{}\"", k.name())).collect::<Vec<_>>().join(" or ");
+    let what = format!(
+        "has the columns {} of {names}, and series.toml says rotation = \"{}\" ({})",
+        other.columns().join(", "),
+        kind.name(),
+        kind.columns().join(", ")
+    );
+    let remedy = format!("write rotation = {names} under [controller] of series.toml");
+    Err(Error::new(Code::CsvColumnMissing, table.place_of_header(), what, remedy))
 }
 
 /// The pose of a row; `None` where all its cells are empty (an image off the robot).
@@ -154,7 +151,8 @@ fn refuse_units(table: &Table, kind: RotationKind, poses: &[&Written]) -> Result
     if is_rad && poses.iter().any(turned) {
         let largest = poses.iter().flat_map(|p| &p.numbers).fold(0.0_f64, |m, v| m.max(v.abs()));
         let what = format!("rotations are said to be \"{}\", and go up to {largest}", kind.name());
-        let remedy = "convert them to radians; roll, pitch, yaw in degrees are w, p, r of rotation = \"wpr_deg\"";
+        let remedy = "convert them to radians; roll, pitch, yaw in degrees are w, p, r of rotation = \"wpr_deg\", rx, ry, rz of \
+                      VAL3 (Staubli) are rotation = \"xyz_deg\"";
         return Err(Error::new(Code::DegreesAsRadians, place, what, remedy));
     }
     Ok(())

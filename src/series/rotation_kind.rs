@@ -23,14 +23,18 @@ pub enum RotationKind {
     /// W, P, R in degrees about fixed axes x, y, z (FANUC).
     #[serde(rename = "wpr_deg")]
     Wpr,
-    /// O, A, T in degrees about z, y', z'' (Kawasaki, Staubli).
+    /// O, A, T in degrees about z, y', z'' (Kawasaki; V+ of Adept and of older Staubli: yaw, pitch, roll).
     #[serde(rename = "zyz_deg")]
     Zyz,
+    /// Rx, Ry, Rz in degrees about x, y', z'' (VAL3 of Staubli).
+    #[serde(rename = "xyz_deg")]
+    Xyz,
 }
 
 impl RotationKind {
     /// All conventions.
-    pub const ALL: [Self; 6] = [Self::Quaternion, Self::RotationVector, Self::Abc, Self::Rpy, Self::Wpr, Self::Zyz];
+    pub const ALL: [Self; 7] =
+        [Self::Quaternion, Self::RotationVector, Self::Abc, Self::Rpy, Self::Wpr, Self::Zyz, Self::Xyz];
 
     /// Name in the manifest.
     pub fn name(self) -> &'static str {
@@ -41,6 +45,7 @@ impl RotationKind {
             Self::Rpy => "rpy_rad",
             Self::Wpr => "wpr_deg",
             Self::Zyz => "zyz_deg",
+            Self::Xyz => "xyz_deg",
         }
     }
 
@@ -48,7 +53,7 @@ impl RotationKind {
     pub fn columns(self) -> &'static [&'static str] {
         match self {
             Self::Quaternion => &["qx", "qy", "qz", "qw"],
-            Self::RotationVector => &["rx", "ry", "rz"],
+            Self::RotationVector | Self::Xyz => &["rx", "ry", "rz"],
             Self::Abc => &["a", "b", "c"],
             Self::Rpy => &["roll", "pitch", "yaw"],
             Self::Wpr => &["w", "p", "r"],
@@ -66,6 +71,7 @@ impl RotationKind {
             Self::Rpy => Some(matrix_from_rpy([a, b, c])),
             Self::Wpr => Some(matrix_from_rpy([a, b, c].map(f64::to_radians))),
             Self::Zyz => Some(about(Vector3::z(), a) * about(Vector3::y(), b) * about(Vector3::z(), c)),
+            Self::Xyz => Some(about(Vector3::x(), a) * about(Vector3::y(), b) * about(Vector3::z(), c)),
         }
     }
 }

@@ -56,6 +56,14 @@ fn what_the_manifest_must_say_is_asked_for() {
         let error = refusal(&[("series.toml", &manifest)]);
         assert_says(&error, Code::CsvColumnMissing, &["controller.csv:1", kind.name(), "\"quaternion\""]);
     }
+    // The same columns mean another rotation in another convention.
+    let turned = "stop,x_m,y_m,z_m,rx,ry,rz\na,0.5,0.25,1,90,90,0\n";
+    let manifest = MANIFEST.replace("quaternion", "xyz_deg");
+    let poses =
+        read(folder(&[("controller.csv", turned), ("series.toml", &manifest)]).path()).unwrap().controller.unwrap();
+    // A quarter about x, then about the new y: what was along z goes along x.
+    let along = poses.base_from_flange[0].unwrap().rotation.column(2).into_owned();
+    assert!((along[0] - 1.0).abs() < 1e-12, "{along}");
 }
 
 #[test]

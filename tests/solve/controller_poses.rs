@@ -76,6 +76,11 @@ fn zyz_deg(pose: &Pose) -> Vec<f64> {
     [o, a, t].map(f64::to_degrees).to_vec()
 }
 
+/// Angles about x, y', z'': those about fixed axes of the inverse, negated.
+fn xyz_deg(pose: &Pose) -> Vec<f64> {
+    pose.inverse().rpy().map(|angle| -angle.to_degrees()).to_vec()
+}
+
 /// The series with these poses instead of joint readings.
 fn series(rotation: &str, columns: &str, poses: &[(String, Pose)], written: Written) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -159,13 +164,14 @@ fn poses_without_a_robot_need_no_gain() {
 #[test]
 fn every_convention_of_rotation_says_the_same() {
     let poses = poses(&truth(), 6);
-    let all: [(&str, &str, Written); 6] = [
+    let all: [(&str, &str, Written); 7] = [
         ("quaternion", "qx,qy,qz,qw", quaternion),
         ("rotvec_rad", "rx,ry,rz", rotation_vector),
         ("abc_deg", "a,b,c", abc_deg),
         ("rpy_rad", "roll,pitch,yaw", roll_pitch_yaw),
         ("wpr_deg", "w,p,r", |p| p.rpy().map(f64::to_degrees).to_vec()),
         ("zyz_deg", "o,a,t", zyz_deg),
+        ("xyz_deg", "rx,ry,rz", xyz_deg),
     ];
     for (rotation, columns, written) in all {
         let folder = series(rotation, columns, &poses, written);
@@ -191,7 +197,8 @@ fn mistakes_in_poses_are_named() {
     };
     let inches: Vec<_> =
         poses.iter().map(|(i, p)| (i.clone(), Pose::new(p.rotation, p.translation / 0.0254))).collect();
-    let cases: [(TempDir, Code, &str); 8] = [
+    let cases: [(TempDir, Code, &str); 9] = [
+        (series("zyz_deg", "o,a,t", &poses, xyz_deg), Code::RotationConvention, "xyz_deg"),
         (series("quaternion", "qx,qy,qz,qw", &poses, first), Code::RotationConvention, "qw"),
         (series("rpy_rad", "roll,pitch,yaw", &poses, rotation_vector), Code::RotationConvention, "rotvec_rad"),
         (series("wpr_deg", "w,p,r", &poses, abc_deg), Code::RotationConvention, "abc_deg"),
