@@ -207,6 +207,7 @@ impl Manifest {
         require_positive(path, "robot.repeatability_m", manifest.robot.repeatability_m)?;
         manifest.cameras.check(path)?;
         manifest.check_measured(path)?;
+        manifest.require_used_mount(path)?;
         manifest.require_same_links(path)?;
         manifest.require_one_carrier(path)?;
         Ok(manifest)
@@ -219,6 +220,18 @@ impl Manifest {
         require_positive(path, "tracker.sigma_rad", tracker.and_then(|t| t.sigma_rad))?;
         require_positive(path, "contact.sigma_m", self.contact.as_ref().and_then(|c| c.sigma_m))?;
         self.distance.iter().try_for_each(|d| d.check(path))
+    }
+
+    /// What is said of all cameras is that of some: cameras that state their own do not read it.
+    fn require_used_mount(&self, path: &Path) -> Result<()> {
+        let Some(of_all) = self.camera_mount else { return Ok(()) };
+        let is_read = self.cameras.is_empty() || self.cameras.iter().any(|c| c.mount.is_none());
+        let differs = |c: &&CameraSection| c.mount.is_some_and(|own| own != of_all);
+        let Some(other) = self.cameras.iter().find(differs).filter(|_| !is_read) else { return Ok(()) };
+        let named = other.name.as_ref().map_or_else(String::new, |name| format!(" of camera \"{name}\""));
+        let what = format!("stands beside another mount{named}, and no camera is without a mount of its own");
+        let remedy = "leave camera_mount out, and state mount = \"hand\" or \"fixed\" of each camera as it is";
+        Err(Error::new(Code::SettingConflict, format!("{}, camera_mount", path.display()), what, remedy))
     }
 
     /// The plate hangs on one link.

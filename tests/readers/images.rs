@@ -70,6 +70,11 @@ fn a_bad_row_names_line_and_column() {
     );
     let unmounted = MANIFEST.replace("mount = \"hand\"\n", "");
     assert_says(&refusal("series.toml", &unmounted), Code::SettingMissing, &["series.toml", "camera_mount"]);
+    // Read for the camera that states none, and by nobody where all do.
+    let with_default = |manifest: &str| manifest.replace("format = 1", "format = 1\ncamera_mount = \"fixed\"");
+    let views = read(folder(&[("series.toml", &with_default(&unmounted))]).path()).unwrap();
+    assert!(views.views().iter().all(|view| view.manifest.mount() == CameraMount::Fixed));
+    assert_says(&refusal("series.toml", &with_default(MANIFEST)), Code::SettingConflict, &["camera_mount", "wrist"]);
     let folder = folder(&[]);
     fs::remove_file(folder.path().join("images.csv")).unwrap();
     assert_says(&read(folder.path()).unwrap_err(), Code::FileMissing, &["images.csv"]);
