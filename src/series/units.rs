@@ -123,7 +123,7 @@ pub fn check_unit(
         AngleUnit::Rad => refuse_degrees_as_radians(file, chain, rows, stating("deg"))?,
         AngleUnit::Deg => refuse_radians_as_degrees(file, chain, rows, &stating("rad"))?,
     }
-    refuse_other_lengths(file, chain, rows)
+    refuse_other_lengths(file, unit, chain, rows)
 }
 
 fn refuse_degrees_as_radians(file: &Path, chain: &Chain, rows: &[&[f64]], remedy: String) -> Result<()> {
@@ -166,7 +166,7 @@ fn refuse_radians_as_degrees(file: &Path, chain: &Chain, rows: &[&[f64]], statin
     Err(Error::new(Code::RadiansAsDegrees, file.display(), what, remedy))
 }
 
-fn refuse_other_lengths(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
+fn refuse_other_lengths(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
     let sliding = || (0..chain.readings.len()).filter(|&i| chain.reading_kinds[i] == JointKind::Prismatic);
     let of_most = |test: &dyn Fn(&[f64]) -> bool| 2 * rows.iter().filter(|q| test(q)).count() > rows.len();
     let keeps = |i: usize, q: &[f64], factor: f64, slack: f64| fits(chain, std::iter::once(i), q, factor, slack);
@@ -188,7 +188,23 @@ fn refuse_other_lengths(file: &Path, chain: &Chain, rows: &[&[f64]]) -> Result<(
         "prismatic joints are metres: multiply the column by {}",
         joined(|unit| format!("{} ({})", unit.metres, unit.sign))
     );
-    Err(Error::new(Code::MillimetresAsMetres, file.display(), what, remedy))
+    let is_angle_of = |other: usize, value: f64| {
+        let (low, high) = limits(chain, other).unwrap_or((-FOREIGN_LIMITS_RAD, FOREIGN_LIMITS_RAD));
+        (low - SOFT_LIMITS_RAD..=high + SOFT_LIMITS_RAD).contains(&(value * unit.in_rad()))
+    };
+    let keeps_exchanged = |other: usize, q: &[f64]| {
+        let mut exchanged = q.to_vec();
+        exchanged.swap(reading, other);
+        keeps(reading, &exchanged, 1.0, SOFT_LIMITS_M) && is_angle_of(other, exchanged[other])
+    };
+    let Some(other) = revolute(chain).find(|&other| of_most(&|q| keeps_exchanged(other, q))) else {
+        return Err(Error::new(Code::MillimetresAsMetres, file.display(), what, remedy));
+    };
+    let [slide, turn] = [reading, other].map(|i| &chain.readings[i]);
+    let (low, high) = range(rows, other);
+    let what = format!("{what}; {turn} reads {low} to {high}: with both columns exchanged both keep their limits");
+    let remedy = format!("exchange the column names {slide} and {turn}; if they are right, {remedy}");
+    Err(Error::new(Code::JointOrderWrong, file.display(), what, remedy))
 }
 
 /// Name and range of the revolute reading that reaches furthest from zero.
@@ -206,15 +222,23 @@ fn range(rows: &[&[f64]], reading: usize) -> (f64, f64) {
 /// that of the others.
 pub(super) fn notices(file: &Path, (stops, view): (&Stops, bool), unit: AngleUnit, chain: &Chain) -> Vec<Notice> {
     let mut notices = Vec::new();
-    let extra: Vec<&str> = stops.joints.iter().filter(|j| !chain.readings.contains(j)).map(String::as_str).collect();
-    if !extra.is_empty() {
-        let what = format!("columns that are no joints between {} and {}: {}", chain.base, chain.tip, extra.join(", "));
-        notices.push(Notice::new(
-            Code::JointUnused,
-            file.display(),
-            what,
-            "they are not used; check the spelling if they should be",
-        ));
+    let extra = stops.joints.iter().filter(|j| !chain.readings.contains(j));
+    let (beside, unknown): (Vec<&String>, Vec<&String>) = extra.partition(|j| chain.beside.contains(j));
+    let ends = format!("between {} and {}", chain.base, chain.tip);
+    let of_other_branches = (
+        format!("columns of joints of the URDF that do not lie {ends}"),
+        "they are not used; where they move the plate or the camera, name the link that carries it: [plate_mount] with link = \
+         \"...\", or link = \"...\" under [camera] of series.toml",
+    );
+    let of_none = (
+        format!("columns that are no joints {ends}, nor any of the URDF"),
+        "they are not used; check the spelling if they should be",
+    );
+    for (joints, (what, remedy)) in [(beside, of_other_branches), (unknown, of_none)] {
+        if !joints.is_empty() {
+            let names = joints.iter().map(|j| j.as_str()).collect::<Vec<_>>().join(", ");
+            notices.push(Notice::new(Code::JointUnused, file.display(), format!("{what}: {names}"), remedy));
+        }
     }
     notices.extend(unused_covariates(file, stops));
     let Ok(columns) = columns_of(file, stops, chain) else { return notices };

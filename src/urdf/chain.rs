@@ -132,6 +132,8 @@ pub struct Chain {
     pub reading_kinds: Vec<JointKind>,
     /// What the joints carry, where the URDF states it.
     pub masses: Vec<CarriedMass>,
+    /// Names of the joints of the description that move and whose readings the chain does not need.
+    pub beside: Vec<String>,
 }
 
 impl Chain {
@@ -200,6 +202,7 @@ impl Chain {
             readings: Vec::new(),
             reading_kinds: Vec::new(),
             masses: Vec::new(),
+            beside: Vec::new(),
         }
     }
 }

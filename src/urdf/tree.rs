@@ -53,6 +53,7 @@ impl RobotDescription {
             readings: Vec::new(),
             reading_kinds: Vec::new(),
             masses: Vec::new(),
+            beside: Vec::new(),
         };
         let (up, down) = self.path(base, tip)?;
         if up.len() + down.len() > MOST_JOINTS {
@@ -83,6 +84,8 @@ impl RobotDescription {
         }
         self.refuse_millimetres(&chain)?;
         chain.masses = self.stated_masses(&chain);
+        let is_beside = |j: &&JointElement| j.joint_type != JointType::Fixed && !chain.readings.contains(&j.name);
+        chain.beside = self.joints.iter().filter(is_beside).map(|j| j.name.clone()).collect();
         Ok(chain)
     }
 

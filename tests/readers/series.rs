@@ -226,6 +226,12 @@ fn readings_are_matched_by_name_in_si() {
     let notices = series.reading_notices(&chain);
     assert_eq!(notices.len(), 1);
     assert_says(&notices[0], Code::JointUnused, &["spare"]);
+    // A joint that moves something beside the chain is another matter than a name that nobody has.
+    let with_branch = Chain { beside: vec!["spare".into()], ..chain.clone() };
+    let misspelt = joints.replace("spare,", "spare,j_2,").replace("0.5,7,", "0.5,7,8,").replace("b.png,", "b.png,,");
+    let series_of_both = read(series_with(&[("series.toml", &degrees), ("joints.csv", &misspelt)]).path()).unwrap();
+    let notices = series_of_both.reading_notices(&with_branch);
+    assert_eq!(notices.iter().map(|n| n.code).collect::<Vec<_>>(), [Code::JointUnused; 2], "{notices:?}");
 
     let renamed = joints.replace("j1", "joint1");
     let series = read(series_with(&[("series.toml", &degrees), ("joints.csv", &renamed)]).path()).unwrap();
@@ -282,6 +288,9 @@ fn an_impossible_unit_is_refused_and_a_possible_one_is_not() {
         Code::MillimetresAsMetres,
         &["x reads 500", "0.001 (mm)"],
     );
+    // A slide that reads what a turning joint may, beside one that reads what the slide may.
+    let exchanged: Vec<[f64; 3]> = degrees.iter().map(|[x, a, b]| [*b, *a, *x]).collect();
+    assert_says(&with_readings(Deg, &exchanged).unwrap_err(), Code::JointOrderWrong, &["x", "j2"]);
     // Neither the factor of mm nor another alone is named where several keep the limits.
     for (unit, factor) in [("cm", 100.0), ("inch", 1.0 / 0.0254)] {
         let read: Vec<[f64; 3]> = radians.iter().map(|[x, a, b]| [x * factor, *a, *b]).collect();

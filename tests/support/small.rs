@@ -105,6 +105,7 @@ pub fn chain(dice: &mut Dice, parts: &[Part]) -> Chain {
         readings,
         reading_kinds: kinds,
         masses,
+        beside: Vec::new(),
     }
 }
 
