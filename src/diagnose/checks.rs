@@ -133,7 +133,7 @@ pub const CHECKS: &[Check] = &[
         },
         ..check("exchanged_pictures", Stage::LeftOut(|a, s| found(exchanged_pictures::check(a, s))))
     },
-    check("exchanged_readings", Stage::LeftOut(|a, _| found(exchanged_readings::check(a)))),
+    check("exchanged_readings", Stage::LeftOut(|a, s| found(exchanged_readings::check(a, s)))),
     Check {
         explains: |_, other| matches!(other, Finding::ManyLeftOut(_)),
         ..check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s))))

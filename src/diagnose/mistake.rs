@@ -60,7 +60,23 @@ pub enum MistakeKind {
         part: Option<ShiftedPart>,
     },
     /// The camera is mounted in the way that is not stated.
-    Mount(CameraMount),
+    Mount {
+        /// How it is mounted.
+        mount: CameraMount,
+        /// Its name, where it is one of several.
+        camera: Option<String>,
+    },
+    /// The images of one camera are those of the other: one is in the hand, one is fixed.
+    Cameras([String; 2]),
+    /// Two arms stand in each other's place.
+    Arms {
+        /// Their joints: of the first arm, and of the second.
+        arms: [Vec<String>; 2],
+        /// True where the columns exchanged fit.
+        columns: bool,
+        /// True where camera and plate exchanged fit.
+        carriers: bool,
+    },
     /// The images show the scene mirrored, and may be turned as well, or the readings of these joints have the wrong sign, where the arm has a
     /// mirror image.
     Mirrored(Vec<String>),
@@ -109,6 +125,8 @@ pub struct ShiftedPart {
 pub enum RowsOf {
     /// That of the readings, as far as is known.
     Readings,
+    /// That of the poses of a controller, from which readings were computed.
+    Poses,
     /// This table of measurements: others fit the readings.
     Measured(&'static str),
     /// images.csv, the rows of one camera: others fit the readings.
@@ -122,6 +140,7 @@ impl RowsOf {
     fn names(self) -> String {
         match self {
             Self::Readings => "the names in the first column of joints.csv".into(),
+            Self::Poses => "the names in the first column of controller.csv".into(),
             Self::Measured(table) => format!("the names in the first column of {table}"),
             Self::Camera => "the stops of this camera in images.csv".into(),
             Self::Pictures => "the names of the images (of observations.csv, its first column)".into(),
@@ -131,8 +150,8 @@ impl RowsOf {
     /// Why not the readings.
     const fn reason(self) -> &'static str {
         match self {
-            Self::Readings => "",
-            _ => " and leave joints.csv as it is, which others fit;",
+            Self::Readings | Self::Poses => "",
+            _ => " and leave the readings as they are, which others fit;",
         }
     }
 }
@@ -237,7 +256,8 @@ impl Kind for Mistake {
             MistakeKind::Unit { .. } | MistakeKind::SlideUnit { .. } => Code::JointUnitWrong,
             MistakeKind::Coupled { .. } => Code::JointCoupled,
             MistakeKind::Rows { .. } => Code::RowsShifted,
-            MistakeKind::Mount(_) => Code::CameraMountWrong,
+            MistakeKind::Arms { columns: true, .. } => Code::JointOrderWrong,
+            MistakeKind::Mount { .. } | MistakeKind::Cameras(_) | MistakeKind::Arms { .. } => Code::CameraMountWrong,
             MistakeKind::Mirrored(_) => Code::ImagesMirrored,
             MistakeKind::Lengths { .. } => Code::LinkLengthsWrong,
             MistakeKind::PlateSize { .. } => Code::PlatePitchWrong,
@@ -341,9 +361,25 @@ impl Kind for Mistake {
                 columns.join(", "),
                 if *below { "up" } else { "down" }
             ),
-            MistakeKind::Mount(mount) => {
+            MistakeKind::Mount { mount, camera } => {
                 let word = if *mount == CameraMount::Hand { "hand" } else { "fixed" };
-                format!("write camera_mount = \"{word}\" in series.toml (of a recording: in the .toml of its name)")
+                match camera {
+                    Some(camera) => format!("write mount = \"{word}\" under the [[camera]] of name = \"{camera}\" in series.toml"),
+                    None => format!("write camera_mount = \"{word}\" in series.toml (of a recording: in the .toml of its name)"),
+                }
+            }
+            MistakeKind::Cameras([a, b]) => format!(
+                "exchange the names {a} and {b} in the column camera of images.csv; if they are right, exchange what stands under their [[camera]] in series.toml"
+            ),
+            MistakeKind::Arms { arms: [first, second], columns, carriers } => {
+                let columns = columns.then(|| {
+                    let (first, second) = (first.join(", "), second.iter().rev().cloned().collect::<Vec<_>>().join(", "));
+                    format!("exchange the column names {first} and {second} in joints.csv")
+                });
+                let carriers = carriers.then(|| {
+                    "give the URDF of the arm that carries the camera with --urdf, and that of the other under [robot_2]".to_owned()
+                });
+                columns.into_iter().chain(carriers).collect::<Vec<_>>().join("; if they are right, ")
             }
             MistakeKind::Mirrored(joints) => {
                 let mirrored = "mirror the images back, or have camera and converter write them as the sensor sees (no mirroring, no exchange of rows and columns)";
@@ -426,11 +462,22 @@ impl Mistake {
                 },
                 if *below { "below" } else { "above" }
             ),
-            MistakeKind::Mount(CameraMount::Hand) => {
+            MistakeKind::Mount { mount: CameraMount::Hand, .. } => {
                 format!("the camera is in the hand and the plate stands still: read so, the {noun}s fit")
             }
-            MistakeKind::Mount(CameraMount::Fixed) => {
+            MistakeKind::Mount { mount: CameraMount::Fixed, .. } => {
                 format!("the camera stands still and the plate is in the hand: read so, the {noun}s fit")
+            }
+            MistakeKind::Cameras([a, b]) => {
+                format!("the {noun}s of {a} and {b} are exchanged: each taken for those of the other, they fit")
+            }
+            MistakeKind::Arms { columns: true, .. } => {
+                format!("the arms are exchanged: with the columns of each taken for those of the other the {noun}s fit")
+            }
+            MistakeKind::Arms { .. } => {
+                format!(
+                    "the arms are exchanged: with the camera on the second and the plate on the first the {noun}s fit"
+                )
             }
             MistakeKind::Mirrored(joints) => {
                 let joints = match joints.as_slice() {

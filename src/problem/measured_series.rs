@@ -94,6 +94,16 @@ impl MeasuredSeries {
         self.postures.iter().any(|others| !others.is_empty())
     }
 
+    /// Whether poses of a controller were read in place of readings, as far as that is known.
+    pub fn poses_were_read(&self) -> bool {
+        !self.otherwise.is_empty() || self.readings_are_computed()
+    }
+
+    /// The file of the readings.
+    pub fn readings_file(&self) -> &'static str {
+        if self.poses_were_read() { "controller.csv" } else { "joints.csv" }
+    }
+
     /// A series without images: stops, and nothing measured yet.
     pub fn without_images(name: &str, order_known: bool, stops: Vec<MeasuredStop>) -> Self {
         Self {

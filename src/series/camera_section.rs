@@ -20,6 +20,17 @@ pub enum CameraMount {
     Fixed,
 }
 
+impl CameraMount {
+    /// The way that it is not.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Hand => Self::Fixed,
+            Self::Fixed => Self::Hand,
+        }
+    }
+}
+
 /// One camera: everything optional, every starting value can be found from the data.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

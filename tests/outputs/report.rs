@@ -186,8 +186,13 @@ fn rows_that_were_exchanged_are_put_right_before_a_failed_result_is_tried_again(
     let doubted =
         DoubtedSize::Contradicted { measured: false, off: 0.02, sigma: 0.001, weight: Weight::Gate, on_rail: false };
     let pair = vec!["img_003.png".to_owned(), "img_008.png".to_owned()];
-    let exchanged =
-        Finding::from(ExchangedReadings { circle: pair.clone(), images: pair, misfit: 1e-4, others_fit: false });
+    let exchanged = Finding::from(ExchangedReadings {
+        circle: pair.clone(),
+        images: pair,
+        misfit: 1e-4,
+        others_fit: false,
+        table: "joints.csv",
+    });
     let (gate, mut record) = (Finding::from(doubted), record());
     record.findings = vec![(&gate).into(), (&exchanged).into()];
     assert_eq!(Verdict::of(&record).remedies, Vec::<String>::new());

@@ -1,6 +1,7 @@
 //! Several cameras at the same stops: one latent joint error a stop, whoever saw it.
 
 use nalgebra::{DVector, Vector3};
+use robotcal::Code;
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{JointNoise, Options, Selection, Solution, identify};
 use robotcal::model::camera::{Camera, Lens};
@@ -10,6 +11,7 @@ use robotcal::problem::{LensChoice, MeasuredSeries, MeasuredStop, PlateShape};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 
 use crate::outputs_support::{context, robot, scene};
+use crate::said::assert_says;
 use crate::support::small::Dice;
 
 pub const JOINT_SIGMA: f64 = 3e-4;
@@ -213,6 +215,23 @@ fn images_of_a_stop_share_its_joint_errors() {
         let nees = normalised(&seen, &solution);
         assert!((0.6..1.6).contains(&nees), "{mounts:?}: {nees}");
     }
+}
+
+/// The images of one camera given to the other, and one camera that is mounted as the other is.
+#[test]
+fn cameras_in_each_others_place_are_named() {
+    let right = seen(&[CameraMount::Hand, CameraMount::Fixed], 24, 31).series;
+    let chain = robot().chain(None, None).unwrap();
+    let said = |series: &[MeasuredSeries]| identify(chain.clone(), series, &Options::default()).unwrap_err();
+    let mut exchanged = right.clone();
+    let (mut in_hand, mut fixed) = (right[0].stops.clone(), right[1].stops.clone());
+    in_hand.iter_mut().for_each(|stop| stop.placement.clone_from(&fixed[0].placement));
+    fixed.iter_mut().for_each(|stop| stop.placement.clone_from(&right[0].stops[0].placement));
+    (exchanged[0].stops, exchanged[1].stops) = (fixed, in_hand);
+    assert_says(&said(&exchanged), Code::CameraMountWrong, &["cam0", "cam1", "images.csv"]);
+    let mut both_in_hand = right.clone();
+    both_in_hand[1].mount = CameraMount::Hand;
+    assert_says(&said(&both_in_hand), Code::CameraMountWrong, &["[[camera]]", "cam1"]);
 }
 
 #[test]

@@ -185,6 +185,25 @@ fn mistakes_in_what_stands_beside_the_arm_are_named() {
     }
 }
 
+/// The second arm carries the plate: a camera that stands still is no cause there.
+#[test]
+fn two_arms_in_each_others_place_are_named() {
+    let [_, _, cell] = cells();
+    let made = measured(&world(&cell.actual, 4), &cell.known);
+    let said = |change: &dyn Fn(&mut MeasuredSeries)| {
+        let mut series = made.clone();
+        change(&mut series);
+        identify(cell.known.clone(), &[series], &Options::default()).unwrap_err()
+    };
+    let exchanged = |series: &mut MeasuredSeries| {
+        series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| q.reverse());
+    };
+    let names: Vec<&str> = cell.known.readings.iter().map(String::as_str).collect();
+    assert_says(&said(&exchanged), Code::JointOrderWrong, &names);
+    // Of two arms of a kind the columns are exchanged as well as what they carry.
+    assert_says(&said(&|series| series.mount = CameraMount::Fixed), Code::JointOrderWrong, &names);
+}
+
 /// Tracked poses of an arm on a rail; the errors of its readings have these sigmas, rad and m.
 fn on_rail(chain: &Chain, (rail, seed): (usize, u64), sigma: impl Fn(usize) -> f64) -> World {
     let mut dice = Dice::new(seed);

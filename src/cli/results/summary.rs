@@ -1,7 +1,7 @@
 //! The answer of `identify` and `show` in at most [`MOST_LINES`] lines: verdict, accuracy, what was left out, what to do, where it stands.
 //! All else is in the long table (`-v`, `show --all`) and in the report.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use crate::assess::Advice;
@@ -150,7 +150,7 @@ fn left_out(r: &SolutionRecord) -> Vec<String> {
         reasons.entry(code).or_default().push(name);
     }
     let out: usize = reasons.values().map(Vec::len).sum();
-    let named: Vec<String> = reasons.iter().map(|(code, names)| reason(*code, names)).collect();
+    let named: Vec<String> = reasons.iter().map(|(code, names)| reason(r, *code, names)).collect();
     let why = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
     let s = &r.statistics;
     let b = &r.bodies.measurements;
@@ -169,19 +169,29 @@ fn left_out(r: &SolutionRecord) -> Vec<String> {
 }
 
 /// Images of one reason, the first few by name.
-fn reason(code: Code, names: &[&str]) -> String {
+fn reason(r: &SolutionRecord, code: Code, names: &[&str]) -> String {
     let more = if names.len() > MOST_NAMED { ", .." } else { "" };
-    format!("{} {}: {}{more}", names.len(), spoken(code), names[..names.len().min(MOST_NAMED)].join(", "))
+    let spoken = if code == Code::ReadingsExchanged { with_exchanged_rows(r) } else { spoken(code) };
+    format!("{} {spoken}: {}{more}", names.len(), names[..names.len().min(MOST_NAMED)].join(", "))
 }
 
 /// Images left out for one reason that are named.
 const MOST_NAMED: usize = 3;
 
+/// Images whose rows are exchanged, in the table of which all that is found says so.
+fn with_exchanged_rows(r: &SolutionRecord) -> String {
+    let found = r.findings.iter().filter(|f| f.code == Code::ReadingsExchanged);
+    let places: BTreeSet<&str> = found.filter_map(|f| f.text.split_once(": ").map(|(place, _)| place)).collect();
+    match places.first().filter(|place| places.len() == 1 && place.ends_with(".csv")) {
+        Some(table) => format!("with exchanged rows of {table}"),
+        None => "in each other's place".into(),
+    }
+}
+
 /// A code as it is spoken of images.
 fn spoken(code: Code) -> String {
     match code {
         Code::WronglyPaired => "wrongly paired".into(),
-        Code::ReadingsExchanged => "with exchanged rows of joints.csv".into(),
         Code::ImageDuplicate => "duplicates".into(),
         Code::MarkersTooFew => "with too few markers".into(),
         Code::ImageContradictory => "contradicting the others".into(),

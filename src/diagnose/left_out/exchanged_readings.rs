@@ -1,6 +1,6 @@
 //! Do images that were left out fit the readings of each other?
 
-use crate::diagnose::kind::{Kind, Quantity, Subject, Weight, some_of};
+use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::problem::{Adjustment, Image, ImageRejection, Mismatch, Problem};
 
@@ -18,10 +18,12 @@ pub struct ExchangedReadings {
     pub misfit: f64,
     /// True where something else that was measured at each of these stops fits its readings: then the images are exchanged.
     pub others_fit: bool,
+    /// The file of the readings.
+    pub table: &'static str,
 }
 
 /// Every circle once, and once for all cameras that saw its stops.
-pub fn check(adjustment: &Adjustment) -> Vec<ExchangedReadings> {
+pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedReadings> {
     let problem = &adjustment.problem;
     let mut found: Vec<ExchangedReadings> = Vec::new();
     for (first, image) in problem.images.iter().enumerate() {
@@ -36,6 +38,7 @@ pub fn check(adjustment: &Adjustment) -> Vec<ExchangedReadings> {
             circle: circle.iter().map(|&(i, _)| problem.images[i].name.clone()).collect(),
             images: problem.images.iter().filter(of_circle).map(|i| i.name.clone()).collect(),
             misfit: circle.iter().map(|&(_, misfit)| misfit).fold(0.0, f64::max),
+            table: setting.series[image.series].readings_file(),
         });
     }
     found
@@ -85,7 +88,7 @@ impl Kind for ExchangedReadings {
     }
 
     fn place(&self) -> String {
-        if self.others_fit { "images" } else { "joints.csv" }.into()
+        if self.others_fit { "images" } else { self.table }.into()
     }
 
     fn seen(&self) -> String {
@@ -103,7 +106,10 @@ impl Kind for ExchangedReadings {
 
     fn remedy(&self) -> String {
         match self.others_fit {
-            true => "exchange these images by their names (where there is images.csv, there), and leave joints.csv as it is, which what else was measured at these stops fits".into(),
+            true => format!(
+                "exchange these images by their names (where there is images.csv, there), and leave {} as it is, which what else was measured at these stops fits",
+                self.table
+            ),
             false => "write these readings beside the images that they fit, and all of them are used".into(),
         }
     }

@@ -1,11 +1,12 @@
 //! When what was read and what was seen do not fit: which usual mistake explains it.
 //!
-//! `readings`, `name_order` and `misread` undo mistakes of readings and of places; `suspects`, `row_shift` and `breaks` try them on images, in whole
-//! series and in parts; of several that explain it `likeliest` names one.
+//! `readings`, `name_order` and `misread` undo mistakes of readings and of places; `suspects`, `mounting`, `row_shift` and `breaks` try them on
+//! images, in whole series and in parts; of several that explain it `likeliest` names one.
 
 pub(super) mod breaks;
 pub(super) mod likeliest;
 pub(super) mod misread;
+mod mounting;
 mod name_order;
 pub(super) mod parts;
 pub(super) mod readings;

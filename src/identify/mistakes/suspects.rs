@@ -17,7 +17,7 @@ use crate::linalg::median;
 use crate::model::mirror::mirror_images;
 use crate::model::robot::Robot;
 use crate::problem::{MeasuredSeries, Problem};
-use crate::series::{CameraMount, LENGTH_UNITS, spread};
+use crate::series::{LENGTH_UNITS, spread};
 use crate::urdf::JointKind;
 
 /// Images of one camera mounting and one plate placement with what they say.
@@ -75,7 +75,7 @@ impl Suspects<'_> {
         let is_partly = |of: &MistakeKind| partly.iter().any(|(_, partly)| partly.is_part_of(of));
         let tried: Vec<(f64, MistakeKind)> = hypotheses
             .into_par_iter()
-            .filter(|(_, mistake)| !is_partly(mistake))
+            .filter(|undone| !is_partly(&undone.1) && !self.are_reversed_arms(undone))
             .map(|(readings, mistake)| (self.misfit(&readings), mistake))
             .collect();
         let all = tried.into_iter().chain(partly.iter().cloned()).chain([self.wrong_mount(), self.mirrored()]);
@@ -130,6 +130,11 @@ impl Suspects<'_> {
             .collect()
     }
 
+    /// Whether the readings come from poses of a controller.
+    pub fn are_of_poses(&self) -> bool {
+        self.pairs.first().is_some_and(|(i, _)| self.series[self.problem.images[*i].series].poses_were_read())
+    }
+
     /// Its stops.
     pub fn stops(&self) -> Vec<SeenStop> {
         self.seen_with(&self.readings())
@@ -139,7 +144,7 @@ impl Suspects<'_> {
         self.misfit_with(readings, |stop| stop)
     }
 
-    fn misfit_with(&self, readings: &[Vec<f64>], changed: impl Fn(SeenStop) -> SeenStop) -> f64 {
+    pub(super) fn misfit_with(&self, readings: &[Vec<f64>], changed: impl Fn(SeenStop) -> SeenStop) -> f64 {
         let stops: Vec<SeenStop> = self.seen_with(readings).into_iter().map(changed).collect();
         // Where bases were found from the readings as they are, they are found anew.
         let placed = bases::found(self.robot).and_then(|joint| bases::placed(self.robot, joint, &stops));
@@ -155,17 +160,6 @@ impl Suspects<'_> {
             camera_from_plate: pair.camera_from_plate,
         };
         self.pairs.iter().zip(readings).map(stop).collect()
-    }
-
-    /// Camera in the hand and fixed camera exchanged.
-    fn wrong_mount(&self) -> (f64, MistakeKind) {
-        let exchanged = |mount| match mount {
-            CameraMount::Hand => CameraMount::Fixed,
-            CameraMount::Fixed => CameraMount::Hand,
-        };
-        let stated = self.pairs.first().map_or(CameraMount::Hand, |(i, _)| self.problem.images[*i].mount);
-        let changed = |stop: SeenStop| SeenStop { mount: exchanged(stop.mount), ..stop };
-        (self.misfit_with(&self.readings(), changed), MistakeKind::Mount(exchanged(stated)))
     }
 
     /// Pictures that were mirrored. With `M = diag(-1, 1, 1)` the camera sees `p' = M (R p + t)` of a point p of the plate, and on a plate that looks

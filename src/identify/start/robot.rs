@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::bases;
 use crate::assess::Limits;
-use crate::diagnose::{Finding, Mistake, ReadingRatio};
+use crate::diagnose::{Finding, Mistake, ReadingRatio, RowsOf};
 use crate::error::{Code, Error, Quantity, Result};
 use crate::fit::FreePoses;
 use crate::geom::log_so3;
@@ -21,7 +21,7 @@ use crate::model::robot::Robot;
 use crate::problem::{
     Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
 };
-use crate::urdf::BASE_FROM_BASE;
+use crate::urdf::{BASE_FROM_BASE, JointKind};
 
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
@@ -214,7 +214,7 @@ fn closed_form(
             "take more images, or give series that share camera mounting and plate placement the same names",
         ));
     }
-    check_rotations(of, poses, limits)?;
+    check_rotations(of, poses, &state.robot, limits)?;
     let starts = solve_hand_eye(poses);
     let cost = |s: &HandEyeStart| {
         let mut trial = state.clone();
@@ -277,8 +277,15 @@ fn check_shared(
 /// Refuses what does not fit: for the mistake that explains it, or because it is too far off.
 fn check_fit(suspects: &Suspects, misfit: f64, of: &str, how: &str) -> Result<()> {
     if let Some((kind, misfit_undone)) = suspects.better_than(misfit) {
-        let rows_of =
-            rows_of_images(suspects.problem, suspects.robot, (suspects.pairs, suspects.groups), suspects.limits);
+        let rows_of = match rows_of_images(
+            suspects.problem,
+            suspects.robot,
+            (suspects.pairs, suspects.groups),
+            suspects.limits,
+        ) {
+            RowsOf::Readings if suspects.are_of_poses() => RowsOf::Poses,
+            rows => rows,
+        };
         let mistake = Mistake { kind, of: of.to_owned(), misfit, misfit_undone, by_images: true, rows_of };
         return Err(Finding::from(mistake).refusal());
     }
@@ -305,7 +312,7 @@ fn no_fit(of: &str, robot: &Robot, how: &str) -> Error {
         ),
         None => (
             "joint readings",
-            "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows (of a recording: the clocks, see --image-delay and --clock log), that the URDF is of this robot, base and tip, and that the plate did not move",
+            "check joint_unit, the order and signs of the joints in joints.csv, that image names stand in the right rows (of a recording: the clocks, see --image-delay and --clock log), that the URDF is of this robot, base and tip, that series.toml names the link that carries the plate ([plate_mount] link) or the camera ([camera] link) where that is not the base or the tip, and that the plate did not move",
         ),
     };
     let what = format!("{what} and images do not belong together: {how}");
@@ -319,7 +326,7 @@ fn not_moved(joints: &[String], suspects: &Suspects, what: &str) -> Error {
         "reads the same at all {stops} stops, and joint readings and images do not belong together: {what}; it may have moved without being read"
     );
     let remedy = format!(
-        "see whether {names} moved between the stops, and write its readings into joints.csv; if it stood still, check joint_unit, the order and signs of the joints, the rows of the images, and that the URDF is of this robot, base and tip"
+        "see whether {names} moved between the stops, and write its readings into joints.csv; if it stood still, check joint_unit, the order and signs of the joints, the rows of the images, and that the URDF is of this robot, base, tip and the links of [plate_mount] and [camera]"
     );
     let stops = Quantity::new("stops", stops as f64, "1");
     Error { quantities: vec![stops], ..Error::new(Code::ReadingsContradict, names, what, remedy) }
@@ -338,7 +345,7 @@ fn pixels(problem: &Problem, state: &State, image: usize) -> Option<f64> {
 }
 
 /// Hand-camera and plate pose need rotations about at least two axes.
-fn check_rotations(of: &str, poses: &[PosePair], limits: &Limits) -> Result<()> {
+fn check_rotations(of: &str, poses: &[PosePair], robot: &Robot, limits: &Limits) -> Result<()> {
     let mut m = nalgebra::DMatrix::<f64>::zeros(3, 3);
     let (mut largest, first) = (0.0_f64, &poses[0]);
     let (mut travel, mut seen) = (0.0_f64, 0.0_f64);
@@ -371,8 +378,23 @@ fn check_rotations(of: &str, poses: &[PosePair], limits: &Limits) -> Result<()> 
             largest.to_degrees(),
             second.to_degrees()
         ),
-        "move the wrist: tilt the camera by 20 to 45 degrees to all sides and roll it between the images",
+        match turns_about_one_direction(robot, limits) {
+            true => {
+                "all joints of this arm turn about one direction, so that its images tell neither the hand-eye transform nor the plate: measure it \
+                 with a tracker (points.csv, poses.csv) or by touches (contacts.csv)"
+            }
+            false => "move the wrist: tilt the camera by 20 to 45 degrees to all sides and roll it between the images",
+        },
     ))
+}
+
+/// True for an arm such as a SCARA, whose axes are all parallel: no posture of it tilts what it carries.
+fn turns_about_one_direction(robot: &Robot, limits: &Limits) -> bool {
+    let chain = &robot.chain;
+    let at_zero = robot.link_poses(&vec![0.0; chain.readings.len()]);
+    let turning = chain.joints.iter().zip(&at_zero).filter(|(joint, _)| joint.kind == JointKind::Revolute);
+    let axes: Vec<_> = turning.map(|(joint, pose)| pose.rotation * joint.axis).collect();
+    axes.iter().all(|axis| axis.cross(&axes[0]).norm() < limits.hand_eye_rotation_rad)
 }
 
 fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye, limits: &Limits) -> Vec<usize> {
@@ -414,4 +436,36 @@ pub(in crate::identify) fn take_back(
     let back: Vec<usize> = aside.iter().copied().filter(|i| is_out(i) && fits(i)).collect();
     back.iter().for_each(|&i| adjustment.problem.images[i].rejected = None);
     !back.is_empty()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::urdf::RobotDescription;
+
+    #[test]
+    fn an_arm_of_parallel_axes_tilts_nothing() {
+        let tilts = |axis: &str, rpy: &str| {
+            let joint = |name: &str, kind: &str, ends: [&str; 2], axis: &str, rpy: &str| {
+                format!(
+                    "<link name='{1}'/><joint name='{name}' type='{kind}'><parent link='{0}'/><child link='{1}'/>\
+                     <origin xyz='0.3 0 0' rpy='{rpy}'/><axis xyz='{axis}'/>\
+                     <limit lower='-1' upper='1' effort='0' velocity='0'/></joint>",
+                    ends[0], ends[1]
+                )
+            };
+            let text = format!(
+                "<robot name='r'><link name='base'/>{}{}{}</robot>",
+                joint("j1", "revolute", ["base", "a"], "0 0 1", "0 0 0"),
+                joint("j2", "prismatic", ["a", "b"], "1 0 0", "0 0 0"),
+                joint("j3", "revolute", ["b", "c"], axis, rpy)
+            );
+            let chain = RobotDescription::from_text(Path::new("r.urdf"), text).and_then(|d| d.chain(None, None));
+            !turns_about_one_direction(&Robot::nominal(chain.unwrap()), &Limits::default())
+        };
+        assert!(!tilts("0 0 1", "0 0 0.5") && !tilts("0 0 -1", "3.14159265 0 0"));
+        assert!(tilts("0 1 0", "0 0 0") && tilts("0 0 1", "1.5 0 0"));
+    }
 }
