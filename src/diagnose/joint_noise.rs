@@ -170,8 +170,9 @@ impl Kind for JointNoiseLarge {
                  stated sigmas contain them. If the arm is in order, and they are far more than a millimetre: did plate or camera move?"
             }
             _ if self.readings_are_computed => {
-                "the joint readings were computed from poses, which tell neither postures nor full turns for certain, and take the URDF for the \
-                 model in the controller: record joint readings (joints.csv)"
+                "the joint readings were computed from poses: see that these are those of the flange in the base (tool and user frame set to \
+                 zero where they were shown or logged). They tell neither postures nor full turns for certain, and take the URDF for the model \
+                 in the controller: record joint readings (joints.csv) where they can be had"
             }
             Weight::Gate if self.stands_still.is_some() => {
                 "see whether that joint was read at these stops: correct their readings, or leave their rows out"

@@ -21,6 +21,7 @@ use robotcal::{Code, Error};
 use tempfile::TempDir;
 
 use crate::robots::kr6_urdf;
+use crate::said::assert_says;
 use crate::support::small::Dice;
 
 const SIGMA_M: f64 = 2e-4;
@@ -321,6 +322,58 @@ fn mistakes_in_the_poses_are_not_blamed_on_right_angles_of_the_first_stop() {
             assert!((0.2..4.0).contains(&distance), "{error}");
         }
     }
+}
+
+/// Angles about y, x', z'', in which no controller of these writes them.
+fn yxz_deg(pose: &Pose) -> Vec<f64> {
+    let r = &pose.rotation;
+    [r[(0, 2)].atan2(r[(2, 2)]), (-r[(1, 2)]).asin(), r[(1, 0)].atan2(r[(1, 1)])].map(f64::to_degrees).to_vec()
+}
+
+/// Images fit poses in a user frame as they are, whatever the robot reaches: nothing is wrong with rotation, unit or direction.
+#[test]
+fn images_tell_a_user_frame_from_mistakes_in_the_poses() {
+    let (_, readings, poses) = by_joints();
+    let tens: Vec<f64> = readings[30].iter().map(|q| 10.0 * (q.to_degrees() / 10.0).round()).collect();
+    let moved =
+        |by: &dyn Fn(&Pose) -> Pose| -> Vec<_> { poses[30..].iter().map(|(i, p)| (i.clone(), by(p))).collect() };
+    let of_frame = Pose::exp(&Vector6::new(1.5, -0.8, 0.2, 0.0, 0.0, 1.2));
+    let in_frame = moved(&|p| of_frame * *p);
+    let wpr = |p: &Pose| p.rpy().map(f64::to_degrees).to_vec();
+    let right = &poses[30..];
+    let refused = |folder: &TempDir, is_stated: bool| {
+        if is_stated {
+            let path = folder.path().join("series.toml");
+            fs::write(&path, fs::read_to_string(&path).unwrap() + &format!("first_stop_deg = {tens:?}\n")).unwrap();
+        }
+        let inputs = Inputs::read(&urdf(), &[folder.path().to_path_buf()], Ends::default()).unwrap();
+        inputs.observe(&Limits::default(), &|_, _| ()).map(|_| ()).unwrap_err()
+    };
+    let unreached = refused(&series("quaternion", "qx,qy,qz,qw", &in_frame, quaternion), false);
+    let quantity = |name: &str| unreached.quantities.iter().find(|q| q.name == name).unwrap().value;
+    assert_eq!(unreached.code, Code::PoseOutOfReach, "{unreached}");
+    assert!(quantity("reached") < quantity("tried"), "{unreached}");
+    let cases: [(TempDir, Code); 4] = [
+        (series("quaternion", "qx,qy,qz,qw", &in_frame, quaternion), Code::SettingConflict),
+        (series("abc_deg", "a,b,c", right, wpr), Code::RotationConvention),
+        (series("zyz_deg", "o,a,t", right, xyz_deg), Code::RotationConvention),
+        // Of a kind that is not known none is named.
+        (series("abc_deg", "a,b,c", right, yxz_deg), Code::SettingConflict),
+    ];
+    for (folder, code) in &cases {
+        let error = refused(folder, true);
+        assert_eq!(error.code, *code, "{error}");
+    }
+}
+
+#[test]
+fn rows_of_a_controller_that_are_shifted_are_those_of_its_table() {
+    let mut poses: Vec<_> = poses(&truth(), 7).into_iter().take(14).collect();
+    let images: Vec<String> = poses.iter().map(|(image, _)| image.clone()).collect();
+    poses.rotate_left(1);
+    poses.iter_mut().zip(images).for_each(|((image, _), own)| *image = own);
+    let error = calibrated(&series("quaternion", "qx,qy,qz,qw", &poses, quaternion)).unwrap_err();
+    assert_says(&error, Code::RowsShifted, &["controller.csv"]);
 }
 
 /// What a controller shows with a tool or a user frame set. A robot that is as in its model would hide any of them in the hand-eye transform or

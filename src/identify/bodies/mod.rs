@@ -7,7 +7,7 @@
 mod breaks;
 mod misfit;
 mod mistakes;
-mod placed;
+pub(super) mod placed;
 mod places_exchanged;
 mod points_start;
 mod repeated_rows;

@@ -7,7 +7,7 @@ use crate::init::{PosePair, solve_hand_eye};
 use crate::problem::BodySeen;
 
 /// What was seen of a body, with the pose of the tip.
-pub(super) type SeenFrom = (BodySeen, Pose);
+pub(in crate::identify) type SeenFrom = (BodySeen, Pose);
 
 /// The pairs of those that are poses.
 pub(super) fn pairs(seen: &[SeenFrom]) -> Vec<PosePair> {
@@ -24,7 +24,7 @@ pub(super) fn points(seen: &[SeenFrom]) -> Vec<PointAt> {
 }
 
 /// What most of these fit, or of points a part of them where most do not fit to `bound`, m; `None` where they are too few or determine nothing.
-pub(super) fn placed(seen: &[SeenFrom], bound: f64) -> Option<Placed> {
+pub(in crate::identify) fn placed(seen: &[SeenFrom], bound: f64) -> Option<Placed> {
     let pairs = pairs(seen);
     if pairs.len() >= FEWEST_POSES {
         return solve_hand_eye(&pairs).into_iter().next().map(|s| (s.solution.camera, s.solution.plate));
@@ -35,7 +35,7 @@ pub(super) fn placed(seen: &[SeenFrom], bound: f64) -> Option<Placed> {
 }
 
 /// How far a body is from where the tip carries it: m of a point, rad + m of a pose.
-pub(super) fn missed((seen, tip): &SeenFrom, (frame, body): &Placed) -> f64 {
+pub(in crate::identify) fn missed((seen, tip): &SeenFrom, (frame, body): &Placed) -> f64 {
     match seen {
         BodySeen::Point(at) => (frame.transform(at) - tip.transform(&body.translation)).norm(),
         BodySeen::Pose(pose) => (*frame * *pose).misfit(&(*tip * *body)),

@@ -5,6 +5,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::told::{ReadAs, Told};
 use crate::error::{Code, Error, Notice, Quantity, Result};
 use crate::geom::Pose;
 use crate::model::inverse::{
@@ -12,7 +13,7 @@ use crate::model::inverse::{
 };
 use crate::model::robot::Robot;
 use crate::problem::MeasuredStop;
-use crate::series::{ControllerPoses, LENGTH_UNITS, LengthUnit, ReadOtherwise, Series};
+use crate::series::{ControllerPoses, LengthUnit, Series};
 use crate::urdf::{Chain, JointKind};
 
 /// Coordinates of a pose.
@@ -27,6 +28,26 @@ const TRIED: usize = 8;
 /// # Errors
 /// Those of [`Series::readings_for`]; poses that the nominal robot does not reach, or reaches in postures without number.
 pub fn readings_of(series: &Series, chain: &Chain) -> Result<Vec<Option<Vec<f64>>>> {
+    readings_told(series, chain, &Told::Open)
+}
+
+/// True for a refusal of poses that the robot does not reach: what was seen at them may tell why.
+pub(in crate::identify) const fn is_unreached(refused: &Error) -> bool {
+    matches!(
+        refused.code,
+        Code::PoseOutOfReach
+            | Code::PosesInverted
+            | Code::RotationConvention
+            | Code::MeasuredUnit
+            | Code::SettingConflict
+    )
+}
+
+/// As [`readings_of`]; what was seen is `told` of the poses, for what is said of those that are not reached.
+///
+/// # Errors
+/// As of [`readings_of`].
+pub(in crate::identify) fn readings_told(series: &Series, chain: &Chain, told: &Told) -> Result<Vec<Option<Vec<f64>>>> {
     let Some(poses) = &series.controller else { return series.readings_for(chain) };
     match chain.pose_coordinates() {
         Some(coordinates) => {
@@ -40,7 +61,7 @@ pub fn readings_of(series: &Series, chain: &Chain) -> Result<Vec<Option<Vec<f64>
                           alone";
             Err(Error::new(Code::JointMissing, series.readings_file().display(), what, remedy))
         }
-        None => Arm::of(chain).postures(series, poses),
+        None => Arm::of(chain).postures(series, poses, told),
     }
 }
 
@@ -77,34 +98,30 @@ pub(in crate::identify) fn notice(series: &Series, chain: &Chain) -> Option<Noti
         .then(|| Notice::new(Code::PosturesFromPoses, series.readings_file().display(), what, remedy))
 }
 
-/// A way to read a pose other than as it is written.
-enum ReadAs<'a> {
-    Rotation(&'a ReadOtherwise),
-    Unit(&'a LengthUnit),
-    Both(&'a ReadOtherwise, &'a LengthUnit),
-}
-
 const fn is_angle(kind: JointKind) -> bool {
     !matches!(kind, JointKind::Prismatic)
 }
 
-/// Poses that the stated angles reach when they are read in another way.
-fn misread(way: &ReadAs, place: String) -> Error {
-    let fit = "the robot reaches them with the angles of first_stop_deg";
+/// Poses that `fit` when they are read in another way; `None` where they do as they are written.
+fn misread(way: ReadAs, poses: &ControllerPoses, place: String, fit: &str) -> Option<Error> {
     let in_unit = |unit: &LengthUnit| format!("positions are in {}", unit.name);
     let to_metres = |unit: &LengthUnit| format!("multiply x_m, y_m and z_m by {}", unit.metres);
-    match way {
-        ReadAs::Rotation(other) => Error::new(other.code, place, other.says(fit), &other.remedy),
-        ReadAs::Unit(unit) => {
-            let what = format!("{}: in metres {fit}", in_unit(unit));
-            Error::new(Code::MeasuredUnit, place, what, to_metres(unit))
+    Some(match (way.otherwise.map(|k| &poses.otherwise[k]), way.unit) {
+        (None, None) => return None,
+        (Some(other), None) => Error::new(other.code, place, other.says(fit), &other.remedy),
+        (None, Some(unit)) => {
+            let what = format!("{}: in metres {fit}", in_unit(&unit));
+            Error::new(Code::MeasuredUnit, place, what, to_metres(&unit))
         }
-        ReadAs::Both(other, unit) => {
-            let what = format!("{}, and {}", in_unit(unit), other.says(fit));
-            Error::new(Code::MeasuredUnit, place, what, format!("{}; {}", to_metres(unit), other.remedy))
+        (Some(other), Some(unit)) => {
+            let what = format!("{}, and {}", in_unit(&unit), other.says(fit));
+            Error::new(Code::MeasuredUnit, place, what, format!("{}; {}", to_metres(&unit), other.remedy))
         }
-    }
+    })
 }
+
+/// What fits where the images or a tracker tell.
+const SEEN_FITS: &str = "what was seen at the stops fits";
 
 /// An arm whose postures are looked for.
 struct Arm {
@@ -117,7 +134,7 @@ impl Arm {
         Self { limits: reading_limits(chain), robot: Robot::nominal(chain.clone()) }
     }
 
-    fn postures(&self, series: &Series, poses: &ControllerPoses) -> Result<Vec<Option<Vec<f64>>>> {
+    fn postures(&self, series: &Series, poses: &ControllerPoses, told: &Told) -> Result<Vec<Option<Vec<f64>>>> {
         let mut before: Option<Vec<f64>> = None;
         let mut all = Vec::with_capacity(poses.base_from_flange.len());
         for (row, pose) in poses.base_from_flange.iter().enumerate() {
@@ -126,8 +143,10 @@ impl Arm {
                 continue;
             };
             let readings = match &poses.stated_deg[row] {
-                Some(stated_deg) => self.near_stated(series, poses, row, stated_deg)?,
-                None => self.nearest(pose, before.as_deref()).ok_or_else(|| self.out_of_reach(series, poses, row))?,
+                Some(stated_deg) => self.near_stated(series, (poses, told), row, stated_deg)?,
+                None => self
+                    .nearest(pose, before.as_deref())
+                    .ok_or_else(|| self.out_of_reach(series, (poses, told), row))?,
             };
             before = Some(readings.clone());
             all.push(Some(readings));
@@ -139,7 +158,7 @@ impl Arm {
     fn near_stated(
         &self,
         series: &Series,
-        poses: &ControllerPoses,
+        (poses, told): (&ControllerPoses, &Told),
         row: usize,
         stated_deg: &[f64],
     ) -> Result<Vec<f64>> {
@@ -153,7 +172,7 @@ impl Arm {
         let read = |(v, kind): (&f64, &JointKind)| if is_angle(*kind) { v.to_radians() } else { *v };
         let stated: Vec<f64> = stated_deg.iter().zip(&chain.reading_kinds).map(read).collect();
         let found = poses.base_from_flange[row].and_then(|pose| self.posture_near(&pose, &stated));
-        found.ok_or_else(|| self.not_as_stated(series, poses, row, &stated, place))
+        found.ok_or_else(|| self.not_as_stated(series, (poses, told), row, &stated, place))
     }
 
     /// The posture that reaches a pose nearest to the stated one, if it is near.
@@ -170,22 +189,23 @@ impl Arm {
         angles.map(|((q, s), _)| (q - s).abs()).fold(0.0, f64::max)
     }
 
-    /// Of ways to read a pose, by their place, the one that the stated posture is nearest to, if it is near.
-    fn nearest_to(&self, stated: &[f64], poses: impl Iterator<Item = Pose>) -> Option<usize> {
-        let off = |pose: Pose| {
-            let found = solve_from(&self.robot, &self.limits, &pose, stated)?;
-            Some(self.farthest_rad(&self.turned(found, stated), stated))
+    /// Of ways to read the poses the one that the stated posture is nearest to, if it is near, and the other poses are reached.
+    fn nearest_to(&self, stated: &[f64], (poses, row): (&ControllerPoses, usize), ways: Vec<ReadAs>) -> Option<ReadAs> {
+        let off = |way: ReadAs| {
+            let found = solve_from(&self.robot, &self.limits, &way.of(poses)[row]?, stated)?;
+            Some((self.farthest_rad(&self.turned(found, stated), stated), way))
         };
-        let all = poses.enumerate().filter_map(|(k, pose)| Some((k, off(pose)?)));
-        let near = all.filter(|(_, off)| *off < FARTHEST_STATED_RAD);
-        near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
+        let mut near: Vec<(f64, ReadAs)> = ways.into_iter().filter_map(off).collect();
+        near.retain(|(off, _)| *off < FARTHEST_STATED_RAD);
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        near.into_iter().map(|(_, way)| way).find(|way| self.reach(&way.of(poses)).is_whole())
     }
 
     /// Where the stated posture does not reach the pose: the mistake in the poses that explains it, if there is one.
     fn not_as_stated(
         &self,
         series: &Series,
-        poses: &ControllerPoses,
+        (poses, told): (&ControllerPoses, &Told),
         row: usize,
         stated: &[f64],
         place: String,
@@ -193,18 +213,18 @@ impl Arm {
         let line = &series.stops.stops[row];
         let of_poses = format!("{}:{}, stop {}", series.readings_file().display(), line.line, line.name());
         let written = poses.base_from_flange[row];
-        let others: Vec<(&ReadOtherwise, Pose)> =
-            poses.otherwise.iter().filter_map(|other| Some((other, other.poses[row]?))).collect();
-        let scaled = |pose: &Pose, unit: &LengthUnit| Pose::new(pose.rotation, pose.translation * unit.metres);
-        let rotations = others.iter().map(|(other, pose)| (ReadAs::Rotation(other), *pose));
-        let units = LENGTH_UNITS.iter().filter_map(|unit| Some((ReadAs::Unit(unit), scaled(&written?, unit))));
-        let both = LENGTH_UNITS
-            .iter()
-            .flat_map(|unit| others.iter().map(move |(other, pose)| (ReadAs::Both(other, unit), scaled(pose, unit))));
-        for ways in [units.chain(rotations).collect::<Vec<_>>(), both.collect()] {
-            if let Some(k) = self.nearest_to(stated, ways.iter().map(|(_, pose)| *pose)) {
-                return misread(&ways[k].0, of_poses);
+        let fit = "the robot reaches them, the first with the angles of first_stop_deg";
+        let mistake = match *told {
+            Told::Fit(way) => misread(way, poses, of_poses, SEEN_FITS),
+            Told::InNoWay => None,
+            Told::Open => {
+                let mut tried = ReadAs::mistaken(poses).into_iter();
+                let found = tried.find_map(|ways| self.nearest_to(stated, (poses, row), ways));
+                found.and_then(|way| misread(way, poses, of_poses, fit))
             }
+        };
+        if let Some(mistake) = mistake {
+            return mistake;
         }
         let tip = self.robot.base_from_tip(stated);
         let apart = written.map_or((0.0, 0.0), |pose| tip.distance(&pose));
@@ -213,9 +233,18 @@ impl Arm {
             1e3 * apart.1,
             apart.0.to_degrees()
         );
-        let remedy = "give the joint angles that the controller shows at the first stop, in deg, with zeros and signs as in the URDF; if they are \
-                      right, the poses are not those of the flange in the base (a tool, a user frame or a work object was active), or their unit or \
-                      [controller] rotation is another";
+        let remedy = match told {
+            Told::Fit(_) => {
+                "give the joint angles that the controller shows at the first stop, in deg, with zeros and signs as in the URDF; if they are \
+                 right, the poses are not those of the flange in the base: a user frame (work object) or a tool was active. Their rotation and \
+                 unit are as stated: what was seen at the stops fits them"
+            }
+            _ => {
+                "give the joint angles that the controller shows at the first stop, in deg, with zeros and signs as in the URDF; if they are \
+                 right, the poses are not those of the flange in the base (a tool, a user frame or a work object was active), or their unit or \
+                 [controller] rotation is another"
+            }
+        };
         let quantities = vec![Quantity::new("distance", apart.1, "m"), Quantity::new("angle", apart.0, "rad")];
         Error { quantities, ..Error::new(Code::SettingConflict, place, what, remedy) }
     }
@@ -263,28 +292,82 @@ impl Arm {
         if others.len() > MOST_POSTURES { Vec::new() } else { others }
     }
 
-    /// Whether most of the poses can be reached.
-    fn reaches(&self, poses: &[Option<Pose>]) -> bool {
+    /// How many of some of the poses can be reached.
+    fn reach(&self, poses: &[Option<Pose>]) -> Reach {
         let known: Vec<&Pose> = poses.iter().flatten().collect();
         let step = known.len().div_ceil(TRIED).max(1);
         let tried: Vec<&Pose> = known.into_iter().step_by(step).collect();
-        2 * tried.iter().filter(|p| !self.postures_of(p).is_empty()).count() > tried.len()
+        let reached = tried.par_iter().filter(|p| !self.postures_of(p).is_empty()).count();
+        Reach { reached, tried: tried.len() }
     }
 
     /// Where a pose is out of reach: the mistake that explains it, if there is one.
-    fn out_of_reach(&self, series: &Series, poses: &ControllerPoses, row: usize) -> Error {
+    fn out_of_reach(&self, series: &Series, (poses, told): (&ControllerPoses, &Told), row: usize) -> Error {
         let stop = &series.stops.stops[row];
         let chain = &self.robot.chain;
         let place = format!("{}:{}, stop {}", series.readings_file().display(), stop.line, stop.name());
-        if !self.reaches(&poses.base_from_flange)
-            && let Some(other) = poses.otherwise.iter().find(|o| self.reaches(&o.poses))
-        {
-            let what = other.says("the robot reaches them");
-            return Error::new(other.code, place, what, &other.remedy);
+        let reach = self.reach(&poses.base_from_flange);
+        let mistake = match *told {
+            Told::Fit(way) => misread(way, poses, place.clone(), SEEN_FITS),
+            Told::Open if !reach.is_of_most() => self.by_reach(poses, &place),
+            _ => None,
+        };
+        if let Some(mistake) = mistake {
+            return mistake;
         }
-        let what = format!("the robot of the URDF reaches no such pose of \"{}\" in \"{}\"", chain.tip, chain.base);
-        let remedy = "check that the poses are those of this link in this base (no tool, no work object), and its joint limits; or leave out \
-                      --urdf: then camera and hand-eye transform are fitted to the poses alone";
-        Error::new(Code::PoseOutOfReach, place, what, remedy)
+        let Reach { reached, tried } = reach;
+        let what = format!(
+            "the robot of the URDF reaches no such pose of \"{}\" in \"{}\"; of {tried} poses of the series it reaches {reached}{}",
+            chain.tip,
+            chain.base,
+            match told {
+                Told::Fit(_) =>
+                    ". What was seen at the stops fits the poses as they are: they are not inverted, rotation and unit are as stated",
+                Told::InNoWay =>
+                    ". What was seen at the stops does not fit them either, nor inverted, in another unit or convention",
+                Told::Open => "",
+            }
+        );
+        let alone = "or leave out --urdf: then camera and hand-eye transform are fitted to the poses alone";
+        let remedy = match told {
+            Told::InNoWay => {
+                "see that the names of the stops stand in the right rows, that plate and camera did not move, and that [controller] rotation is \
+                 that of the controller: it may be of a kind that this program does not know"
+                    .to_owned()
+            }
+            _ => format!(
+                "see whether a user frame (work object) or a tool was active, and write the poses of this link in this base; check base and tip, \
+                 and the joint limits; {alone}"
+            ),
+        };
+        let quantities = vec![Quantity::new("reached", reached as f64, "1"), Quantity::new("tried", tried as f64, "1")];
+        Error { quantities, ..Error::new(Code::PoseOutOfReach, place, what, remedy) }
+    }
+
+    /// The mistake with which all poses that are tried are reached: a guess, as a frame in the base may bring poses out of reach, too.
+    fn by_reach(&self, poses: &ControllerPoses, place: &str) -> Option<Error> {
+        let other = poses.otherwise.iter().find(|o| self.reach(&o.poses).is_whole())?;
+        let remedy = format!(
+            "{}; where that is not so, a user frame or a tool may be active in the poses (`identify` asks the images)",
+            other.remedy
+        );
+        Some(Error::new(other.code, place, other.says("the robot reaches them"), remedy))
+    }
+}
+
+/// Poses that can be reached.
+#[derive(Debug, Clone, Copy)]
+struct Reach {
+    reached: usize,
+    tried: usize,
+}
+
+impl Reach {
+    const fn is_of_most(self) -> bool {
+        2 * self.reached > self.tried
+    }
+
+    const fn is_whole(self) -> bool {
+        self.reached == self.tried && self.tried > 0
     }
 }

@@ -12,7 +12,8 @@ use super::stated::{lens_of, measured_series, on_the_tip_beside_others};
 use crate::assess::Limits;
 use crate::detect::{Detection, set_radii};
 use crate::error::{Code, Error, Notice, Result};
-use crate::identify::controller::readings::{self, other_postures, readings_of};
+use crate::identify::controller::readings::{self, is_unreached, other_postures, readings_of, readings_told};
+use crate::identify::controller::told::told;
 use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop, Shared};
 use crate::series::{CirclePoint, Observation, Plate, Series, Source, StopOrder};
 use crate::urdf::Chain;
@@ -45,10 +46,29 @@ pub fn measure(
     limits: &Limits,
     progress: impl Fn(&Path) + Sync,
 ) -> Result<MeasuredWithNotices> {
-    if series.source == Source::NoImages {
-        return measure_bodies(series, chain, several);
-    }
-    let readings = readings_of(series, chain)?;
+    let measured = |readings| match series.source {
+        Source::NoImages => bodies_at(series, chain, several, readings),
+        _ => seen_at(series, chain, several, (limits, &progress), readings),
+    };
+    let refused = match readings_of(series, chain) {
+        Ok(readings) => return measured(readings),
+        Err(refused) => refused,
+    };
+    let Some(poses) = series.controller.as_ref().filter(|_| is_unreached(&refused)) else { return Err(refused) };
+    // What was seen tells a mistake in the poses from a frame or a tool.
+    let Ok(seen) = measured(vec![None; series.stops.stops.len()]) else { return Err(refused) };
+    let told = told(&seen.series, poses, limits);
+    Err(readings_told(series, chain, &told).err().unwrap_or(refused))
+}
+
+/// What was seen at these readings.
+fn seen_at(
+    series: &Series,
+    chain: &Chain,
+    several: bool,
+    (limits, progress): (&Limits, impl Fn(&Path) + Sync),
+    readings: Vec<Option<Vec<f64>>>,
+) -> Result<MeasuredWithNotices> {
     let bodies = seen_bodies(series, several);
     let lengths = seen_lengths(series, several, &bodies)?;
     let mut notices = notices_of(series, chain);
@@ -118,7 +138,16 @@ pub fn image_size(series: &Series, found: Option<(u32, u32)>) -> Result<(u32, u3
 /// # Errors
 /// Of the readings (unit, missing joints); distances between what was not measured.
 pub fn measure_bodies(series: &Series, chain: &Chain, several: bool) -> Result<MeasuredWithNotices> {
-    let readings = readings_of(series, chain)?;
+    bodies_at(series, chain, several, readings_of(series, chain)?)
+}
+
+/// What was measured in space alone at these readings.
+fn bodies_at(
+    series: &Series,
+    chain: &Chain,
+    several: bool,
+    readings: Vec<Option<Vec<f64>>>,
+) -> Result<MeasuredWithNotices> {
     let bodies = seen_bodies(series, several);
     let lengths = seen_lengths(series, several, &bodies)?;
     Ok(MeasuredWithNotices {

@@ -1,0 +1,129 @@
+//! How poses of a controller are to be read, by what was seen at them.
+//!
+//! A tool on the flange and a frame in the base are constant: hand-eye transform and target pose take them up, and what was seen fits the poses as
+//! they are written, whether or not the robot reaches them. No constant makes up for another convention of rotation, inverted poses or another unit.
+
+use std::collections::BTreeMap;
+
+use crate::assess::Limits;
+use crate::geom::Pose;
+use crate::identify::bodies::placed::{SeenFrom, missed, placed};
+use crate::identify::mistakes::suspects::some_of;
+use crate::identify::photogrammetry::free_poses::free_poses_of;
+use crate::init::{PosePair, hand_eye_misfit};
+use crate::linalg::lower_median;
+use crate::model::robot::Robot;
+use crate::problem::{BodySeen, MeasuredSeries};
+use crate::series::{CameraMount, ControllerPoses, LENGTH_UNITS, LengthUnit};
+use crate::urdf::Chain;
+
+/// A way to read poses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::identify) struct ReadAs {
+    /// The mistake that is undone, by its place among [`ControllerPoses::otherwise`].
+    pub otherwise: Option<usize>,
+    /// The unit of the positions, where it is not metres.
+    pub unit: Option<LengthUnit>,
+}
+
+impl ReadAs {
+    /// As they are written.
+    pub const WRITTEN: Self = Self { otherwise: None, unit: None };
+
+    /// All ways with one mistake undone, and all with two.
+    pub fn mistaken(poses: &ControllerPoses) -> [Vec<Self>; 2] {
+        let others = || (0..poses.otherwise.len()).map(|k| Self { otherwise: Some(k), unit: None });
+        let in_units = |way: Self| LENGTH_UNITS.iter().map(move |unit| Self { unit: Some(*unit), ..way });
+        [in_units(Self::WRITTEN).chain(others()).collect(), others().flat_map(in_units).collect()]
+    }
+
+    /// The poses, read so.
+    pub fn of(self, poses: &ControllerPoses) -> Vec<Option<Pose>> {
+        let read = self.otherwise.map_or(&poses.base_from_flange, |k| &poses.otherwise[k].poses);
+        let metres = self.unit.map_or(1.0, |unit| unit.metres);
+        read.iter().map(|pose| pose.map(|p| Pose::new(p.rotation, p.translation * metres))).collect()
+    }
+}
+
+/// What was seen tells of the poses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::identify) enum Told {
+    /// Nothing: too little was seen.
+    Open,
+    /// They fit, read so.
+    Fit(ReadAs),
+    /// They fit in none of the usual ways.
+    InNoWay,
+}
+
+/// What was seen at the stops of one camera and one target, or of one body.
+enum Seen {
+    Images(Vec<(usize, CameraMount, Pose)>),
+    Body(Vec<(usize, BodySeen)>),
+}
+
+impl Seen {
+    /// By the images, else by what a tracker saw; `None` where there are too few of both.
+    fn of(series: &MeasuredSeries, limits: &Limits) -> Option<Self> {
+        let enough = |count: usize| count >= limits.hand_eye_images;
+        if let Some(images) = images(series, limits).filter(|images| enough(images.len())) {
+            return Some(Self::Images(images));
+        }
+        let mut groups: BTreeMap<(&str, &str), Vec<(usize, BodySeen)>> = BTreeMap::new();
+        for body in series.bodies.iter().filter(|body| !body.kind.is_parallel_to_base()) {
+            groups.entry((&body.instrument, &body.body)).or_default().push((body.stop, body.seen));
+        }
+        let largest = groups.into_values().max_by_key(Vec::len);
+        largest.filter(|seen| enough(seen.len())).map(Self::Body)
+    }
+
+    /// Median misfit with these poses of the flange, rad + m (m of points); infinite where they determine nothing.
+    fn misfit(&self, poses: &[Option<Pose>]) -> f64 {
+        match self {
+            Self::Images(images) => {
+                let pair = |(stop, mount, seen): &(usize, CameraMount, Pose)| {
+                    Some(PosePair::of_flange(*mount, (*poses.get(*stop)?)?, *seen))
+                };
+                let pairs: Vec<PosePair> = images.iter().filter_map(pair).collect();
+                let pairs: Vec<PosePair> = some_of(pairs.len()).map(|k| pairs[k]).collect();
+                hand_eye_misfit(&pairs)
+            }
+            Self::Body(seen) => {
+                let at = |(stop, seen): &(usize, BodySeen)| Some((*seen, (*poses.get(*stop)?)?));
+                let seen: Vec<SeenFrom> = seen.iter().filter_map(at).collect();
+                let by = placed(&seen, f64::INFINITY);
+                by.map_or(f64::INFINITY, |by| lower_median(seen.iter().map(|seen| missed(seen, &by))))
+            }
+        }
+    }
+}
+
+/// Poses of the camera at the placement with most of them.
+fn images(series: &MeasuredSeries, limits: &Limits) -> Option<Vec<(usize, CameraMount, Pose)>> {
+    let alone = MeasuredSeries { bodies: Vec::new(), lengths: Vec::new(), ..series.clone() };
+    let robot = Robot::nominal(Chain::empty());
+    let (_, free, _) = free_poses_of(&robot, std::slice::from_ref(&alone), limits, |_| Ok(())).ok()?;
+    let mut groups: BTreeMap<&str, Vec<(usize, CameraMount, Pose)>> = BTreeMap::new();
+    for (k, (stop, pose)) in series.stops.iter().zip(&free.poses).enumerate() {
+        if let Some(pose) = pose {
+            groups.entry(&stop.placement).or_default().push((k, series.mount, pose.camera_from_plate));
+        }
+    }
+    groups.into_values().max_by_key(Vec::len)
+}
+
+/// How the poses fit what was seen in the series, which has no readings yet.
+pub(in crate::identify) fn told(series: &MeasuredSeries, poses: &ControllerPoses, limits: &Limits) -> Told {
+    let Some(seen) = Seen::of(series, limits) else { return Told::Open };
+    let misfit = |way: ReadAs| seen.misfit(&way.of(poses));
+    let as_written = misfit(ReadAs::WRITTEN);
+    if as_written < limits.suspicious_misfit {
+        return Told::Fit(ReadAs::WRITTEN);
+    }
+    let explains = |left: f64| left < limits.suspicious_misfit && left < limits.mistake_explains * as_written;
+    let best_of = |ways: Vec<ReadAs>| {
+        let tried = ways.into_iter().map(|way| (misfit(way), way));
+        tried.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(left, _)| explains(*left))
+    };
+    ReadAs::mistaken(poses).into_iter().find_map(best_of).map_or(Told::InNoWay, |(_, way)| Told::Fit(way))
+}
