@@ -324,6 +324,7 @@ codes! {
         PlateMoved "plate_moved" "the plate was moved: images were left out",
         CameraMoved "camera_moved" "the camera was moved on its mount: images were left out",
         ImagesTurned "images_turned" "images are turned about the optical axis against the others: they were left out",
+        IdsReversed "ids_reversed" "ids of some images are counted from the other end of the plate: they were left out",
         ImagesShifted "images_shifted" "some pictures of a camera are cut out elsewhere than the others",
         PlateDisplaced "plate_displaced" "the plate stands a little elsewhere from some image on, or by turns",
         CameraDisplaced "camera_displaced" "the camera sits a little elsewhere from some image on",

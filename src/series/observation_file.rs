@@ -147,13 +147,29 @@ impl<'a> Reader<'a> {
         let uv = [self.table.number(row, self.uv[0])?, self.table.number(row, self.uv[1])?];
         let Some((width, height)) = self.size_px else { return Ok(uv) };
         for (column, value, size) in [(self.uv[0], uv[0], width), (self.uv[1], uv[1], height)] {
-            if !(-0.5..=f64::from(size) - 0.5).contains(&value) {
-                let what = format!("is outside the image of {width} x {height} px");
-                let remedy = "check width_px and height_px; (0, 0) is the centre of the top-left pixel";
+            if !is_inside(value, size) {
+                let (what, remedy) = match self.fits_exchanged((width, height)) {
+                    true => (
+                        format!(
+                            "is outside the image of {width} x {height} px, and with u and v exchanged all points are inside"
+                        ),
+                        "exchange the column names u and v: u is the column, v the row of the image",
+                    ),
+                    false => (
+                        format!("is outside the image of {width} x {height} px"),
+                        "check width_px and height_px; (0, 0) is the centre of the top-left pixel",
+                    ),
+                };
                 return Err(self.table.refuse(Code::CsvRange, row, column, &what, remedy));
             }
         }
         Ok(uv)
+    }
+
+    /// Whether all points are in the image where u is taken for v.
+    fn fits_exchanged(&self, (width, height): (u32, u32)) -> bool {
+        let within = |row, column, size| self.table.number(row, column).is_ok_and(|value| is_inside(value, size));
+        self.table.rows().all(|row| within(row, self.uv[1], width) && within(row, self.uv[0], height))
     }
 
     fn covariance(&self, row: Row<'_>) -> Result<Option<[f64; 3]>> {
@@ -175,6 +191,11 @@ impl<'a> Reader<'a> {
         }
         Ok(Some([uu, uv, vv]))
     }
+}
+
+/// Whether a coordinate lies in an image of so many pixels.
+fn is_inside(value: f64, size: u32) -> bool {
+    (-0.5..=f64::from(size) - 0.5).contains(&value)
 }
 
 /// Text of observations.csv; edge and covariance columns only where they say something.

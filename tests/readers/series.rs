@@ -340,6 +340,11 @@ fn observations_replace_images_and_are_checked_by_line() {
     assert_says(&with("a.png,-1,1,2,,,,,,,"), Code::CsvNumber, &["observations.csv:2", "\"-1\""]);
     assert_says(&with("a.png,1,x,2,,,,,,,"), Code::CsvNumber, &["observations.csv:2", "column u", "\"x\""]);
     assert_says(&with("a.png,1,1,80,,,,,,,"), Code::CsvRange, &["observations.csv:2", "column v", "100 x 80"]);
+    // Every point is in the image where u is taken for v.
+    let exchanged = with("a.png,1,60,99,,,,,,,\nb.png,1,70,10,,,,,,,");
+    assert_says(&exchanged, Code::CsvRange, &["observations.csv:2", "u and v"]);
+    let neither = with("a.png,1,60,99,,,,,,,\nb.png,1,90,10,,,,,,,");
+    assert_says(&neither, Code::CsvRange, &["observations.csv:2", "width_px"]);
     assert_says(&with("a.png,1,1,2,middle,,,,,,"), Code::CsvName, &["observations.csv:2", "middle"]);
     assert_says(&with("a.png,1,1,2,inner,,,,,,"), Code::CsvName, &["observations.csv:2", "inner"]);
     assert_says(&with("a.png,1,1,2,,1,2,1,,,"), Code::CsvRange, &["observations.csv:2", "cov_uu"]);

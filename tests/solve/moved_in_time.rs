@@ -379,6 +379,25 @@ fn images_that_are_turned_among_others_are_listed_one_by_one() {
     }
 }
 
+/// A board that has a first corner, whose corners another program counts from the last one in some images: the plate stands where it does.
+#[test]
+fn ids_that_are_counted_from_the_other_end_are_no_moved_plate() {
+    let made = seen(CameraMount::Hand, 30, 3);
+    let mut series = measured(&made, &kr6());
+    let last = series.plate.markers.len() as u32 - 1;
+    assert_eq!(series.plate.markers.iter().map(|m| m.id).collect::<Vec<_>>(), (0..=last).collect::<Vec<_>>());
+    for stop in series.stops.iter_mut().skip(2).step_by(5) {
+        stop.observations.iter_mut().for_each(|o| o.marker = last - o.marker);
+        stop.observations.sort_by_key(|o| (o.marker, o.edge));
+    }
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let solution = identify(kr6(), &[series], &options).unwrap();
+    let found = solution.findings.iter().find(|f| f.code() == Code::IdsReversed);
+    let found = found.unwrap_or_else(|| panic!("{:?}", solution.findings));
+    assert_eq!(found.subjects().len(), 6, "{found}");
+    assert!(found.quantities()[0].value < 5e-3, "{found}");
+}
+
 /// Whole degrees are a noise of 5 mrad: nothing moved.
 #[test]
 fn readings_in_whole_degrees_are_named_and_no_move() {

@@ -40,6 +40,11 @@ pub enum Moved {
         /// rad.
         angle_rad: f64,
     },
+    /// The ids of the markers, counted from the other end: the plate would stand where it does, turned by half a turn about its centre.
+    Ids {
+        /// How far its centre would be from its place, m.
+        distance_m: f64,
+    },
     /// The pictures, about the optical axis: the camera would sit where it does, turned by quarter turns.
     Images {
         /// By how much they are turned, clockwise, rad.
@@ -59,14 +64,14 @@ pub enum Moved {
 impl Moved {
     const fn unknowns(&self) -> f64 {
         match self {
-            Self::Plate { .. } | Self::Camera { .. } | Self::Images { .. } => 6.0,
+            Self::Plate { .. } | Self::Camera { .. } | Self::Images { .. } | Self::Ids { .. } => 6.0,
             _ => 1.0,
         }
     }
 
     const fn body(&self) -> Option<&'static str> {
         match self {
-            Self::Plate { .. } => Some("the plate"),
+            Self::Plate { .. } | Self::Ids { .. } => Some("the plate"),
             Self::Camera { .. } | Self::Images { .. } => Some("the camera"),
             _ => None,
         }
@@ -92,7 +97,7 @@ pub fn agreement(robot: &Robot, others: &HandEye, seen: &[SeenStop], limits: &Li
         None => 0..robot.chain.readings.len(),
     };
     let zeros = readings.clone().filter_map(|joint| zero(robot, &stops, joint, limits));
-    let plate = place(&stops, &others.plate, |stop| stop.plate, limits, plate_moved);
+    let plate = place(&stops, &others.plate, |stop| stop.plate, limits, |old, new| plate_moved(old, new, limits));
     let camera = place(&stops, &others.camera, |stop| stop.camera, limits, |old, new| camera_moved(old, new, limits));
     let all: Vec<Agreement> = zeros.chain(plate).chain(camera).collect();
     let most = all.iter().map(|a| a.members.len()).max().unwrap_or(0);
@@ -244,9 +249,14 @@ fn copied(stops: &[Stop], limits: &Limits) -> Option<Agreement> {
     (differ + 1 >= limits.moved_images).then_some(Agreement { moved, members, spread })
 }
 
-fn plate_moved(old: &Pose, new: &Pose) -> Moved {
+/// A grid whose ids are counted from the other end seems turned by half a turn about its centre, and stays there.
+fn plate_moved(old: &Pose, new: &Pose, limits: &Limits) -> Moved {
     let (angle_rad, distance_m) = old.distance(new);
-    Moved::Plate { distance_m, angle_rad }
+    let half_turn = Pose::new(exp_so3(&Vector3::new(0.0, 0.0, std::f64::consts::PI)), Vector3::zeros());
+    match new.misfit(&(*old * half_turn)) < limits.set_aside_floor {
+        true => Moved::Ids { distance_m },
+        false => Moved::Plate { distance_m, angle_rad },
+    }
 }
 
 fn camera_moved(old: &Pose, new: &Pose, limits: &Limits) -> Moved {
@@ -291,6 +301,20 @@ fn place(
 mod tests {
     use super::*;
     use nalgebra::Vector6;
+
+    #[test]
+    fn a_plate_that_seems_turned_by_half_a_turn_about_its_centre_has_ids_from_the_other_end() {
+        let limits = Limits::default();
+        let plate = Pose::from_xyz_rpy([0.5, 0.1, 0.2], [0.1, -0.2, 0.7]);
+        let moved = |x_m: f64, yaw: f64| {
+            plate_moved(&plate, &(plate * Pose::from_xyz_rpy([x_m, 0.0, 0.0], [0.0, 0.0, yaw])), &limits)
+        };
+        let half = std::f64::consts::PI;
+        assert!(matches!(moved(1e-4, half - 1e-3), Moved::Ids { distance_m } if (distance_m - 1e-4).abs() < 1e-9));
+        for other in [moved(0.05, half), moved(0.0, half - 0.1), moved(0.0, 0.5 * half), moved(1e-4, 0.0)] {
+            assert!(matches!(other, Moved::Plate { .. }), "{other:?}");
+        }
+    }
 
     #[test]
     fn a_camera_that_seems_turned_about_its_axis_alone_has_turned_pictures() {

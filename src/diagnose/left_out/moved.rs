@@ -84,6 +84,7 @@ impl Kind for BodyMoved {
             Moved::Plate { .. } => Code::PlateMoved,
             Moved::Camera { .. } => Code::CameraMoved,
             Moved::Images { .. } => Code::ImagesTurned,
+            Moved::Ids { .. } => Code::IdsReversed,
             Moved::Zero { .. } => Code::ZeroMoved,
             Moved::Readings { .. } => Code::JointReadingsWrong,
         }
@@ -107,6 +108,7 @@ impl Kind for BodyMoved {
             Moved::Images { turn_rad, distance_m } => {
                 vec![Quantity::new("turn", turn_rad, "rad"), Quantity::new("distance", distance_m, "m")]
             }
+            Moved::Ids { distance_m } => vec![Quantity::new("distance", distance_m, "m")],
             Moved::Zero { kind, offset, .. } => vec![Quantity::new("offset", offset, kind.units()[0])],
             Moved::Readings { .. } => Vec::new(),
         }
@@ -117,6 +119,7 @@ impl Kind for BodyMoved {
             Moved::Plate { .. } => "plate".into(),
             Moved::Camera { .. } => "camera on its mount".into(),
             Moved::Images { .. } => "images".into(),
+            Moved::Ids { .. } => "ids of the markers".into(),
             Moved::Zero { joint, .. } | Moved::Readings { joint: Some(joint), .. } => joint.clone(),
             Moved::Readings { joint: None, .. } => "joint readings".into(),
         }
@@ -158,6 +161,10 @@ impl Kind for BodyMoved {
                 turn_rad.to_degrees().abs(),
                 1e3 * distance_m
             ),
+            Moved::Ids { distance_m } => format!(
+                "{images} show the plate turned by half a turn about its centre ({:.1} mm from its place): in them its markers are counted from the other end",
+                1e3 * distance_m
+            ),
             Moved::Zero { kind, offset, or, .. } if self.by_turns => format!(
                 "its zero stands in two places by turns: {images} agree on {:+.3} {} from that of the others, which stand between them{}",
                 1e3 * offset,
@@ -194,6 +201,9 @@ impl Kind for BodyMoved {
             }
             Moved::Images { .. } => {
                 "turn these images back, and see what turns them (camera, driver, viewer); another mounting is right only where the camera itself was turned, as its lens is then turned with it"
+            }
+            Moved::Ids { .. } => {
+                "number the markers of these images from the same end as those of the others: the last id plus the first, less the id; a board with an odd and an even count of corners shows where it begins. Where the plate itself was turned, give these rows a placement of their own"
             }
             Moved::Zero { .. } => "identify the robot from the stops of one mastering, before the move or after it",
             Moved::Readings { .. } => "correct the readings of these stops, or leave their rows out",

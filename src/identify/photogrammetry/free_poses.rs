@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix6, Vector2};
 
-use super::exchanged_counts::with_counts_exchanged;
+use super::numbering::with_numbering;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::fit::{FocalLength, FreePose, FreePoses, PlacedCamera};
@@ -144,7 +144,7 @@ pub fn adjust_free_poses(
         let homographies = fit_homographies(adjustment)?;
         for (camera, start) in starts.iter().enumerate() {
             let started = start_camera(adjustment, camera, &homographies, start, &mut verdicts);
-            let explained = |e| with_counts_exchanged(e, &adjustment.problem, camera, limits.mistake_explains);
+            let explained = |e| with_numbering(e, &adjustment.problem, camera, limits.mistake_explains);
             adjustment.state = started.map_err(explained)?;
         }
         Ok(())
@@ -409,14 +409,15 @@ fn finish(start: Adjustment, limits: &Limits) -> Result<(Adjustment, FreePoses)>
         outcome = estimate_components_near(outcome.adjustment, &options);
     }
     if outcome.status != Status::Converged {
-        return Err(facing(&outcome.adjustment, limits.facing_tilt_rad).unwrap_or_else(|| {
-            Error::new(
-                Code::NotConverged,
-                "free camera poses",
-                format!("the adjustment {}", outcome.status.words()),
-                "look at the images for a wrong plate, motion blur or changed focus",
-            )
-        }));
+        let problem = &outcome.adjustment.problem;
+        let not_converged = || {
+            let what = format!("the adjustment {}", outcome.status.words());
+            let remedy = "look at the images for a wrong plate, motion blur or changed focus";
+            let error = Error::new(Code::NotConverged, "free camera poses", what, remedy);
+            let numbered = |e, camera| with_numbering(e, problem, camera, limits.mistake_explains);
+            (0..problem.cameras.len()).fold(error, numbered)
+        };
+        return Err(facing(&outcome.adjustment, limits.facing_tilt_rad).unwrap_or_else(not_converged));
     }
     let fit = outcome.fit().map_err(|e| undetermined(Code::CameraUndetermined, &e.to_string()))?;
     check_focal(&fit, limits)?;
