@@ -17,6 +17,11 @@ use crate::geom::Pose;
 /// Name of the file.
 pub(super) const NAME: &str = "controller.csv";
 
+/// The file in a folder that says where the robot stood.
+pub(super) fn table_of_stops(folder: &Path) -> &'static str {
+    if folder.join(NAME).is_file() { NAME } else { "joints.csv" }
+}
+
 /// Flanges of most robots are nearer to their base than this, m; in millimetres they are farther.
 const FARTHEST_M: f64 = 50.0;
 

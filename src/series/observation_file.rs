@@ -232,9 +232,9 @@ pub(super) fn in_order<'a>(
 }
 
 /// No observation at all is an error: nothing could be solved from it.
-pub(super) fn require_some(path: &Path, images: &[ImageObservations]) -> Result<()> {
+pub(super) fn require_some(path: &Path, table: &str, images: &[ImageObservations]) -> Result<()> {
     if images.is_empty() {
-        let what = "has no usable observation of any image in joints.csv";
+        let what = format!("has no usable observation of any image in {table}");
         return Err(Error::new(
             Code::ObservationsMissing,
             path.display(),

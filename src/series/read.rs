@@ -201,7 +201,11 @@ fn views_of(series: &mut Series, use_observations: bool) -> Result<Vec<Series>> 
         return Err(Error::new(Code::FileMissing, path.display(), what, remedy));
     }
     let table = Table::read(&path, &mut series.inputs)?;
-    let rows = image_file::rows(&table, &StopIndex::of(&series.stops), &series.manifest.cameras)?;
+    let rows = image_file::rows(
+        &table,
+        &StopIndex::of(&series.stops, controller_file::table_of_stops(&series.folder)),
+        &series.manifest.cameras,
+    )?;
     let Series { name, folder, manifest, stops, controller, .. } = &*series;
     let all = Seen { series: name, folder, manifest, stops, controller: controller.as_ref() };
     let mut inputs = Vec::new();
@@ -300,9 +304,10 @@ fn observed(
     let size = manifest.camera().size_px();
     let images = observation_file::read(path, plate, size, inputs)?;
     let (ordered, strange) = observation_file::in_order(images, stops.stops.iter().map(|s| s.image.as_str()));
-    observation_file::require_some(path, &ordered)?;
+    let table = controller_file::table_of_stops(path.parent().unwrap_or(path));
+    observation_file::require_some(path, table, &ordered)?;
     if !strange.is_empty() {
-        let what = format!("observes {} that joints.csv does not name: {}", count(strange.len()), some(&strange));
+        let what = format!("observes {} that {table} does not name: {}", count(strange.len()), some(&strange));
         notices.push(Notice::new(
             Code::ImageUnlisted,
             path.display(),
@@ -313,7 +318,7 @@ fn observed(
     let seen: BTreeSet<&str> = ordered.iter().map(|i| i.image.as_str()).collect();
     let unseen: Vec<_> = stops.stops.iter().map(|s| s.image.clone()).filter(|i| !seen.contains(i.as_str())).collect();
     if !unseen.is_empty() {
-        let what = format!("has no observation of {} in joints.csv: {}", count(unseen.len()), some(&unseen));
+        let what = format!("has no observation of {} in {table}: {}", count(unseen.len()), some(&unseen));
         notices.push(Notice::new(Code::ObservationsMissing, path.display(), what, "they are left out"));
     }
     Ok(Source::Observations(ordered))
@@ -379,7 +384,8 @@ fn pictured(
     let named: BTreeSet<&str> = stops.stops.iter().map(|s| s.image.as_str()).collect();
     let unnamed: Vec<String> = names.iter().filter(|n| !named.contains(n.as_str())).cloned().collect();
     if !unnamed.is_empty() {
-        let what = format!("{} that no row of joints.csv names: {}", count(unnamed.len()), some(&unnamed));
+        let table = csv.file_name().unwrap_or_default().display();
+        let what = format!("{} that no row of {table} names: {}", count(unnamed.len()), some(&unnamed));
         notices.push(Notice::new(
             Code::ImageUnlisted,
             images.display(),

@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::contact_file::{self, ContactRow};
+use super::controller_file::table_of_stops;
 use super::inputs::InputFile;
 use super::joints::Stops;
 use super::point_file::{self, PointRow};
@@ -36,7 +37,7 @@ impl SpatialFiles {
     /// # Errors
     /// By file, line and stop: stops that are not there, numbers that are none, rows that say the same thing.
     pub fn read(folder: &Path, stops: &Stops, inputs: &mut Vec<InputFile>, notices: &mut Vec<Notice>) -> Result<Self> {
-        let index = StopIndex::of(stops);
+        let index = StopIndex::of(stops, table_of_stops(folder));
         let mut table = |name: &str| -> Result<Option<Table>> {
             let path = folder.join(name);
             path.is_file().then(|| Table::read(&path, inputs)).transpose()

@@ -8,28 +8,33 @@ use super::joints::{StopKey, Stops};
 use super::table::{Row, Table};
 use crate::error::{Code, Error, Result, closest_name};
 
-/// The stops of joints.csv by name.
+/// The stops of a series by name.
 pub(super) struct StopIndex<'a> {
     by_name: BTreeMap<&'a str, usize>,
     key: StopKey,
+    /// The file that names them.
+    table: &'static str,
 }
 
 impl<'a> StopIndex<'a> {
-    pub fn of(stops: &'a Stops) -> Self {
-        Self { by_name: stops.stops.iter().enumerate().map(|(k, s)| (s.name(), k)).collect(), key: stops.key }
+    /// Of the stops that this file names.
+    pub fn of(stops: &'a Stops, table: &'static str) -> Self {
+        let by_name = stops.stops.iter().enumerate().map(|(k, s)| (s.name(), k)).collect();
+        Self { by_name, key: stops.key, table }
     }
 
     /// The stop that a row names.
     pub fn find(&self, table: &Table, row: Row<'_>, column: usize) -> Result<usize> {
-        let name = row.cell(column);
+        let (name, own) = (row.cell(column), self.table);
         if name.is_empty() {
-            return Err(table.refuse(Code::CsvCellEmpty, row, column, "names no stop", "name it as in joints.csv"));
+            let remedy = format!("name it as in {own}");
+            return Err(table.refuse(Code::CsvCellEmpty, row, column, "names no stop", &remedy));
         }
         self.by_name.get(name).copied().ok_or_else(|| {
-            let what = format!("is no {} of joints.csv", self.key.column());
+            let what = format!("is no {} of {own}", self.key.column());
             let remedy = match closest_name(name, self.by_name.keys().copied()) {
-                Some(meant) => format!("is \"{meant}\" meant? else add the stop to joints.csv, or remove the row"),
-                None => "add the stop to joints.csv, or remove the row".to_owned(),
+                Some(meant) => format!("is \"{meant}\" meant? else add the stop to {own}, or remove the row"),
+                None => format!("add the stop to {own}, or remove the row"),
             };
             table.refuse(Code::StopUnknown, row, column, &what, &remedy)
         })

@@ -85,6 +85,13 @@ fn a_bad_pose_names_line_and_stop() {
     let manifest = MANIFEST.replace("quaternion", "rotvec_rad");
     let error = refusal(&[("controller.csv", turned), ("series.toml", &manifest)]);
     assert_says(&error, Code::DegreesAsRadians, &["controller.csv", "180"]);
+    let tracked = format!("{MANIFEST}[tracker]\nname = \"t\"\n");
+    let strange = ("points.csv", "stop,target,x_m,y_m,z_m\nc,t,0,0,0\n");
+    assert_says(
+        &refusal(&[("series.toml", &tracked), strange]),
+        Code::StopUnknown,
+        &["points.csv:2", "\"c\"", "controller.csv"],
+    );
     let empty = "stop,x_m,y_m,z_m,qx,qy,qz,qw\n";
     assert_says(&refusal(&[("controller.csv", empty)]), Code::FileEmpty, &["controller.csv"]);
 }

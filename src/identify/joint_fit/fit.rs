@@ -302,7 +302,11 @@ fn check_on_robot(problem: &Problem, on_robot: usize, series: &[MeasuredSeries])
         _ if on_robot > 0 || problem.used_bodies().next().is_some() => Ok(()),
         0 => Err(Error::new(
             Code::ReadingsMissing,
-            format!("joints.csv of {}", series.iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ")),
+            format!(
+                "{} of {}",
+                series.first().map_or("joints.csv", MeasuredSeries::readings_file),
+                series.iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ")
+            ),
             format!(
                 "no row has joint readings: all {all} images were taken off the robot, and tell of the camera and the plate only"
             ),

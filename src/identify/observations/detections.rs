@@ -30,7 +30,8 @@ pub fn detect_stops(series: &Series, limits: &Limits, progress: impl Fn(&Path) +
     let paths: Vec<PathBuf> = series.stops.stops.iter().filter_map(|s| s.path.clone()).collect();
     let mut found = detect_series(&paths, &series.plate, &picture, progress).into_iter();
     let missing = |image: &str| {
-        let remedy = "copy it into images/, or remove its row from joints.csv";
+        let table = series.readings_file();
+        let remedy = format!("copy it into images/, or remove its row from {}", table.display());
         SeriesImage::failed(Error::new(Code::ImageNotThere, image, "the image file is missing", remedy))
     };
     let seen = series.stops.stops.iter().map(|stop| {
