@@ -212,6 +212,7 @@ codes! {
         PlateMirrored "plate_mirrored" "the plate is seen in a mirror, or described mirrored",
         PlateContradicted "plate_contradicted" "the pattern that is seen is not that of the plate file",
         PlateLineHidden "plate_line_hidden" "a whole line of the plate is not seen where it should be",
+        PlateTwice "plate_twice" "markers of the plate are seen in two places: two equal plates",
         PlateNowhere "plate_nowhere" "no image can be used",
         MarkersUnmeasured "markers_unmeasured" "most identified markers of an image cannot be measured",
         MarkersSmoothed "markers_smoothed" "markers of an image whose edges are clipped or spoilt were measured in a smoothed copy of it",

@@ -302,3 +302,33 @@ fn a_mirrored_or_incomplete_grid_is_refused() {
     let view = View::new(1, 1, [110.0, 240.4], 44.0, 0.0, [0.0, 0.0]);
     assert!(detect(&Scene { view, ..scene }.render(0), &plate).is_err());
 }
+
+/// With as many markers in the first row as the stated number exceeds the true one, a board fits on itself, moved by a column and a row.
+#[test]
+fn a_wrong_first_marker_is_named_where_the_board_fits_moved() {
+    for (columns, rows, stated) in [(6, 4, 3), (8, 6, 4), (4, 6, 2), (10, 7, 6), (7, 5, 4), (8, 5, 5), (8, 5, 4)] {
+        let square = 560.0 / f64::from(columns + 3).max(1.4 * f64::from(rows + 3));
+        let view = View::new(columns, rows, [321.3, 239.6], square, 0.1, [0.01, -0.006]);
+        let print = Print::Charuco { dictionary: DICT_5X5_50, ratio: 0.72, legacy: false };
+        let picture = Scene { print, ..Scene::new(columns, rows, view) }.render(0);
+        let seen = |first_id: u32| {
+            let aruco = Aruco { dictionary: "DICT_5X5_50".to_owned(), side_m: 0.0072, legacy: false, first_id };
+            let plate = Plate { aruco: Some(aruco), ..Plate::lattice(PlateKind::Charuco, columns, rows, 0.01, 1e-4) };
+            detect(&picture, &plate)
+        };
+        assert_eq!(seen(0).unwrap().observations.len() as u32, columns * rows, "{columns} x {rows}");
+        let error = seen(stated).expect_err("another first marker");
+        assert_says(&error, Code::PlateContradicted, &["first_id = 0"]);
+    }
+}
+
+#[test]
+fn two_equal_boards_are_said() {
+    let one = charuco_scene(0.1).render(0);
+    let pixels = one.pixels.chunks_exact(one.width).flat_map(|row| [row, row].concat()).collect();
+    let two = Picture { width: 2 * one.width, pixels, ..one };
+    let plate = charuco_plate(Some(("DICT_4X4_50", 0.7)));
+    let found = detect(&two, &plate).unwrap();
+    assert!(!found.observations.is_empty());
+    assert!(found.notices.iter().any(|n| n.code == Code::PlateTwice), "{:?}", found.notices);
+}

@@ -3,7 +3,10 @@
 //! The `calib-targets` library decodes the markers and so tells which corner is which; the positions are measured as on
 //! a plain chessboard, from the pixels along the edges that the markers leave free.
 
+use calib_targets_chessboard::ChessCorner;
+
 use super::charuco_markers::{Marker, Print, decode, prints};
+use super::charuco_numbers::{Contradiction, Counting, contradiction};
 use super::charuco_seen::{Seen, ids, instead};
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
@@ -14,6 +17,7 @@ use crate::detect::pictures::bytes::Bytes;
 use crate::detect::shared::KEEP_OFF_PX;
 use crate::detect::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
+use crate::geom::PlaneMap;
 use crate::series::Plate;
 
 /// Markers that must be read where the dictionary is not stated, or where an outer line is not seen.
@@ -22,6 +26,8 @@ const LEAST_MARKERS: usize = 4;
 const FURTHER_MARKERS: usize = 2;
 /// Corners that are on no board of the other layout and prove this one.
 const FURTHER_CORNERS: usize = 2;
+/// Squares around the inner corners in which other corners still are those of the board.
+const MARGIN: f64 = 1.5;
 /// Wrong bits of a marker that proves where the board lies.
 const SURE_BITS: u8 = 1;
 
@@ -47,6 +53,9 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
         }
         return Err(instead(picture, plate).map_or_else(|| no_board(plate), |seen| other_board(plate, &seen)));
     };
+    if let Some(refusal) = numbers_contradict(picture, plate, board, &found) {
+        return refusal;
+    }
     let is_sure = found.is_sure(board);
     if plate.aruco.is_some() && prints.first().is_some_and(|stated| stated.legacy != found.print.legacy) {
         let error = other_layout(found.print.legacy);
@@ -58,7 +67,7 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     if found.has_further_row && is_sure {
         return Ok(Detection::beyond(more_rows(plate)));
     }
-    let Found { print, lattice, .. } = found;
+    let Found { print, lattice, has_twin, .. } = found;
     let window = Window { arm: 0.5 * (1.0 - print.ratio), keep_off_px: KEEP_OFF_PX, ..WINDOW };
     let mut detection = measure(picture, &lattice, Placement::on_board(board, print.legacy), window);
     if detection.outline == Outline::LineMissing && is_sure {
@@ -72,7 +81,22 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     if plate.aruco.is_none() {
         detection.notices.push(found_print(&print));
     }
+    detection.notices.extend(has_twin.then(twin));
     Ok(detection)
+}
+
+/// The refusal of a board whose markers, all that are in view, are not those that the plate file has at their places.
+fn numbers_contradict(picture: &Picture, plate: &Plate, board: BoardSize, found: &Found) -> Option<Result<Detection>> {
+    let stated = plate.aruco.as_ref().map_or(0, |aruco| aruco.first_id);
+    match contradiction(picture, &found.lattice, &found.print, board)? {
+        Contradiction::Counts(Counting { first_id, legacy }) if first_id == stated => {
+            let is_other = plate.aruco.as_ref().is_some_and(|aruco| aruco.legacy != legacy);
+            is_other.then(|| Ok(Detection::other_size(other_layout(legacy))))
+        }
+        Contradiction::Counts(counting) => Some(Ok(Detection::other_size(other_first(plate, counting)))),
+        Contradiction::Outnumbers { wrong, right } => Some(Err(instead(picture, plate)
+            .map_or_else(|| other_numbers(plate, [wrong, right]), |seen| other_board(plate, &seen)))),
+    }
 }
 
 /// What was found at one of the sizes.
@@ -87,6 +111,8 @@ struct Found {
     has_further_row: bool,
     /// What the other layout explains, where markers fit into it.
     rival: Option<(usize, usize)>,
+    /// Whether another board with the same markers lies beside it.
+    has_twin: bool,
 }
 
 impl Found {
@@ -128,7 +154,7 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
         let lattice: Lattice = found.corners.iter().map(|(at, px)| (*at, place(*px))).collect();
         let has_place = have_place(&found.markers);
         let has_further_row = has_further_row(&found.markers, board);
-        let found = Found { print: *print, markers, lattice, has_place, has_further_row, rival: None };
+        let found = Found { print: *print, markers, lattice, has_place, has_further_row, rival: None, has_twin: false };
         all.push((print.legacy, found.explains()));
         if best.as_ref().is_none_or(|other| other.explains() < found.explains()) {
             best = Some(found);
@@ -137,8 +163,25 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
     if let Some(best) = &mut best {
         let rivals = all.iter().filter(|(legacy, _)| *legacy != best.print.legacy);
         best.rival = rivals.map(|(_, explains)| *explains).max();
+        let others = beside(&corners, &best.lattice, scale, board);
+        if 2 * others.len() >= best.lattice.len() {
+            let twin = decode(&scaled.view(), &others, &best.print, board)?;
+            best.has_twin = twin.is_some_and(|twin| have_place(&twin.markers));
+        }
     }
     Ok(best)
+}
+
+/// The corners that do not lie on the board, with its margin.
+fn beside(corners: &[ChessCorner], lattice: &Lattice, scale: f64, board: BoardSize) -> Vec<ChessCorner> {
+    let pairs: Vec<_> = lattice.iter().map(|(&(u, v), &uv)| (uv, [f64::from(u), f64::from(v)])).collect();
+    let Some(map) = PlaneMap::fit(&pairs) else { return Vec::new() };
+    let size = [board.columns, board.rows].map(f64::from);
+    let is_beside = |corner: &&ChessCorner| {
+        let place = [corner.position.x, corner.position.y].map(|c| on_picture(c, scale));
+        map.apply(place).is_none_or(|at| (0..2).any(|a| at[a] < -MARGIN || at[a] > size[a] - 1.0 + MARGIN))
+    };
+    corners.iter().filter(is_beside).copied().collect()
 }
 
 /// Whether markers of the last row of squares are read: that takes the corners below them, and at the end of a board there are none.
@@ -170,6 +213,12 @@ fn found_print(print: &Print) -> Notice {
             }
         },
     )
+}
+
+fn twin() -> Notice {
+    let what = "two boards with the same markers are in view: one of them is taken";
+    let remedy = "take the image so that one plate with these markers is in view, or print others with other numbers";
+    Notice::new(Code::PlateTwice, "image", what, remedy)
 }
 
 fn not_found(plate: &Plate) -> String {
@@ -216,6 +265,31 @@ fn other_board(plate: &Plate, seen: &Seen) -> Error {
         }
     };
     Error::new(Code::PlateNotFound, "image", format!("{}: {}", not_found(plate), differs.join(", ")), remedy)
+}
+
+/// Markers that count from another number than the plate file states.
+fn other_first(plate: &Plate, Counting { first_id, legacy }: Counting) -> Error {
+    let stated = plate.aruco.as_ref();
+    let what =
+        format!("the markers of the board count from {first_id}, not {}", stated.map_or(0, |aruco| aruco.first_id));
+    let other_layout = legacy != stated.is_some_and(|aruco| aruco.legacy) && plate.rows % 2 == 1;
+    let layout = if other_layout { format!(", and legacy = {legacy}") } else { String::new() };
+    let remedy = format!(
+        "write first_id = {first_id}{layout} in the plate file; if that is not the board, correct columns and rows"
+    );
+    Error::new(Code::PlateContradicted, "image", what, remedy)
+}
+
+/// Markers that no board of these columns and rows has at their places.
+fn other_numbers(plate: &Plate, [wrong, right]: [usize; 2]) -> Error {
+    let stated = ids(plate);
+    let what = format!(
+        "{wrong} markers are read where a board with {} to {} has others or none, and {right} that agree",
+        stated.start,
+        stated.end.saturating_sub(1)
+    );
+    let remedy = "correct first_id, dictionary and legacy of the plate file, or columns and rows";
+    Error::new(Code::PlateContradicted, "image", what, remedy)
 }
 
 fn more_rows(plate: &Plate) -> Error {

@@ -294,6 +294,11 @@ impl<'a> Shader<'a> {
         relative_shade(brightness(self.picture, self.maps.place(cell, place)?)?, cell, &self.inner)
     }
 
+    /// Where a place in the frame of a cell lies, px.
+    pub fn place(&self, cell: (i32, i32), place: [f64; 2]) -> Option<[f64; 2]> {
+        self.maps.place(cell, place)
+    }
+
     /// Counts at a place in the frame of a cell.
     pub fn brightness(&self, cell: (i32, i32), place: [f64; 2]) -> Option<f64> {
         brightness(self.picture, self.maps.place(cell, place)?)

@@ -3,11 +3,12 @@
 //! ```text
 //! picture -> corner_finder (about where corners are; sizes: at which size of the picture) -> labels (which corner of the board each is)
 //!         -> chessboard, or charuco with charuco_markers, or puzzleboard (one file a kind; corners are measured in `corners`)
-//!         -> ends, seen, charuco_seen (is it the board of the plate file, and all of it that is in view)
+//!         -> ends, seen, charuco_numbers, charuco_seen (is it the board of the plate file, and all of it that is in view)
 //! ```
 
 pub mod charuco;
 mod charuco_markers;
+mod charuco_numbers;
 pub(super) mod charuco_seen;
 pub mod chessboard;
 mod corner_finder;

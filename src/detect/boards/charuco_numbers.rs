@@ -1,0 +1,136 @@
+//! Whether the numbers of a ChArUco board's markers are those of the plate file.
+//!
+//! The library places a board by the markers that agree. On a board that counts from another number some agree, too, a few squares away: so the
+//! light squares of the lattice are read once more, with those just beyond the board, and what contradicts is weighed.
+
+use std::collections::BTreeMap;
+
+use super::charuco_markers::Print;
+use super::labels::{BoardSize, Lattice, Shader};
+use crate::detect::Picture;
+use crate::detect::tags::code::Reader;
+use crate::series::{TagPrint, Tags};
+
+/// Squares beyond the board in which markers are looked for.
+const BEYOND: i32 = 1;
+/// So many markers are no chance.
+const LEAST: usize = 2;
+
+/// Column and row of a square of the board.
+type Square = (i32, i32);
+
+/// How a board numbers its markers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Counting {
+    /// Number of the first marker.
+    pub first_id: u32,
+    /// OpenCV's layout before 4.6.
+    pub legacy: bool,
+}
+
+impl Counting {
+    fn of(print: &Print) -> Self {
+        Self { first_id: print.first_id, legacy: print.legacy }
+    }
+}
+
+/// What the markers say that stand where the plate file has others or none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Contradiction {
+    /// Most markers in view are those of a board that counts so.
+    Counts(Counting),
+    /// They outnumber those that agree.
+    Outnumbers { wrong: usize, right: usize },
+}
+
+/// What contradicts the numbers of a board that was found as this print; `None` where nothing does.
+pub(super) fn contradiction(
+    picture: &Picture,
+    lattice: &Lattice,
+    print: &Print,
+    board: BoardSize,
+) -> Option<Contradiction> {
+    let read = read(picture, lattice, print, board);
+    let stated = Counting::of(print);
+    let agrees = |(square, id): &&(Square, u32)| number(board, stated, *square) == Some(*id);
+    let right = read.iter().filter(agrees).count();
+    let wrong = read.len() - right;
+    if wrong < LEAST {
+        return None;
+    }
+    let (best, votes) = most_agree(&read, board, stated)?;
+    if best != stated && votes >= right + LEAST && 2 * votes > read.len() {
+        return Some(Contradiction::Counts(best));
+    }
+    (wrong > right).then_some(Contradiction::Outnumbers { wrong, right })
+}
+
+/// The upright markers in the light squares of the lattice.
+fn read(picture: &Picture, lattice: &Lattice, print: &Print, board: BoardSize) -> Vec<(Square, u32)> {
+    let Some(shader) = Shader::of(picture, lattice) else { return Vec::new() };
+    let dictionary = print.dictionary;
+    let tags = Tags {
+        dictionary: dictionary.name().to_owned(),
+        print: TagPrint::Opencv,
+        side_m: 1.0,
+        gap_m: 0.0,
+        first_id: 0,
+    };
+    let reader = Reader::of(&tags, &dictionary);
+    let (low, high) = (0.5 * (1.0 - print.ratio), 0.5 * (1.0 + print.ratio));
+    let marker = |(column, row): Square| {
+        // Corners are counted from the first inner one.
+        let cell = (column - 1, row - 1);
+        let [a, b, c, d] = [[low, low], [high, low], [high, high], [low, high]].map(|at| shader.place(cell, at));
+        let quad = [a?, b?, c?, d?];
+        let reading = reader.read(picture, &quad, false)?;
+        let [.., top_left] = reading.corners;
+        (top_left == quad[0]).then_some(((column, row), reading.id))
+    };
+    let rows = -BEYOND..=board.rows + BEYOND;
+    let squares = rows.flat_map(|row| (-BEYOND..=board.columns + BEYOND).map(move |column| (column, row)));
+    squares.filter(|square| is_light(*square, print.legacy)).filter_map(marker).collect()
+}
+
+fn is_light((column, row): Square, legacy: bool) -> bool {
+    ((column + row).rem_euclid(2) == 0) == legacy
+}
+
+/// The number of the marker in a square; `None` where there is none.
+fn number(board: BoardSize, counting: Counting, square: Square) -> Option<u32> {
+    counting.first_id.checked_add(before(board, counting.legacy, square)?)
+}
+
+/// Markers before that in a square; `None` where there is none.
+fn before(board: BoardSize, legacy: bool, (column, row): Square) -> Option<u32> {
+    let width = board.columns + 1;
+    let on_board = (0..width).contains(&column) && (0..=board.rows).contains(&row);
+    if !on_board || !is_light((column, row), legacy) {
+        return None;
+    }
+    // Light squares among the first ones of a row.
+    let light = |row: i32, columns: i32| (columns + i32::from(is_light((0, row), legacy))) / 2;
+    u32::try_from((0..row).map(|row| light(row, width)).sum::<i32>() + light(row, column)).ok()
+}
+
+/// The counting with which most markers agree, wherever the board lies then, with their number; of equals the one that differs least.
+fn most_agree(read: &[(Square, u32)], board: BoardSize, stated: Counting) -> Option<(Counting, usize)> {
+    // With an odd number of rows of squares there is one layout.
+    let layouts = [stated.legacy, !stated.legacy].into_iter().take(if board.rows % 2 == 1 { 2 } else { 1 });
+    let mut votes: BTreeMap<(Square, Counting), usize> = BTreeMap::new();
+    for legacy in layouts {
+        for down in -board.rows..=board.rows {
+            for right in -board.columns..=board.columns {
+                let first = |((column, row), id): &(Square, u32)| {
+                    id.checked_sub(before(board, legacy, (column + right, row + down))?)
+                };
+                for first_id in read.iter().filter_map(first) {
+                    *votes.entry(((right, down), Counting { first_id, legacy })).or_default() += 1;
+                }
+            }
+        }
+    }
+    let alike = |c: &Counting| (c.first_id == stated.first_id, c.legacy == stated.legacy);
+    let best = votes.into_iter().max_by_key(|((_, counting), count)| (*count, alike(counting)))?;
+    Some((best.0.1, best.1))
+}
