@@ -4,7 +4,7 @@ use std::path::Path;
 
 use calib_targets_puzzleboard::code_maps::{horizontal_edge_bit, vertical_edge_bit};
 use robotcal::Code;
-use robotcal::detect::{Picture, detect};
+use robotcal::detect::{Picture, detect, detect_series};
 use robotcal::series::{Plate, parse_plate, plate_toml};
 
 use crate::circles_support::{Scene, View, pose, scene};
@@ -122,4 +122,26 @@ fn what_cannot_be_read_is_refused_and_what_is_written_reads_back() {
     assert_eq!(code(&format!("{}origin_col = 3\n", board.replace("puzzleboard", "chessboard"))), Code::SettingConflict);
     let plate = plate("origin_row = 9\norigin_col = 4\ndot_diameter_rel = 0.3");
     assert_eq!(parse_plate(Path::new("plate.toml"), &plate_toml(&plate, None).unwrap(), "").unwrap(), plate);
+}
+
+/// The dots tell which corner is which, so that a hand over an outer line costs the corners below it and no more.
+#[test]
+fn a_covered_line_leaves_the_other_corners() {
+    let plate = plate("origin_row = 12\norigin_col = 31");
+    let view = View { distance_m: 0.6, tilt_deg: 15.0, ..View::default() };
+    let (scene, mut picture) = shown(&plate, &view);
+    let all = detect(&picture, &plate).unwrap();
+    let last = all.observations.iter().map(|o| o.uv[0]).fold(0.0, f64::max);
+    let first = all.observations.iter().map(|o| o.uv[0]).fold(f64::MAX, f64::min);
+    let begin = last - 0.28 * (last - first);
+    let width = picture.width;
+    for (k, value) in picture.pixels.iter_mut().enumerate().filter(|(k, _)| (k % width) as f64 > begin) {
+        *value = 70.0 + (k / width % 7) as f32;
+    }
+    let image = detect_series(&["1.png".into()], &plate, |_| Ok(picture.clone()), |_| {}).remove(0);
+    assert!(image.detection.failure.is_none(), "{:?}", image.detection.failure);
+    let errors = errors(&scene, &picture);
+    assert!((35..72).contains(&errors.len()), "{}", errors.len());
+    assert!(errors.iter().all(|e| *e < 0.15), "{errors:?}");
+    assert!(image.detection.notices.iter().any(|n| n.code == Code::PlateLineHidden));
 }

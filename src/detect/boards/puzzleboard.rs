@@ -17,7 +17,7 @@ use crate::detect::circles::{FALSE_ALARMS, binomial_tail};
 use crate::detect::corners::{Window, measure};
 use crate::detect::pictures::bytes::Bytes;
 use crate::detect::shared::KEEP_OFF_PX;
-use crate::detect::{Detection, Dropped, Picture};
+use crate::detect::{Detection, Dropped, Outline, Picture};
 use crate::error::{Code, Error, Result};
 use crate::series::{Next, Plate, Puzzle};
 
@@ -57,6 +57,10 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let window = Window { dot: puzzle.dot_diameter_rel / 2.0, keep_off_px: KEEP_OFF_PX, ..WINDOW };
     let mut detection = measure(picture, &lattice, Placement::on_board(board, puzzle.is_light_first()), window);
     detection.dropped.extend(dropped);
+    // The dots tell the place of every corner, whatever hides a line of them.
+    if detection.outline == Outline::LineMissing {
+        detection.outline = Outline::TagsMissing;
+    }
     if detection.observations.is_empty() { Err(nothing(plate)) } else { Ok(detection) }
 }
 
