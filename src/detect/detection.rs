@@ -135,11 +135,11 @@ impl From<circles::CircleDetection> for Detection {
 }
 
 /// Clipped paper, strong compression, sharpening, motion.
-fn smoothed_notice(smoothed: usize, found: usize) -> Notice {
+pub fn smoothed_notice(smoothed: usize, found: usize) -> Notice {
     let what = format!(
         "{smoothed} of {found} markers have clipped edges, or edges that no blur explains, and were measured in a smoothed copy of the image"
     );
-    let remedy = "expose for less time, store images as PNG, switch off sharpening, and see that nothing moves";
+    let remedy = "expose for less time, store images as PNG (of a colour sensor after demosaicing), switch off sharpening, and see that nothing moves";
     Notice::new(Code::MarkersSmoothed, "image", what, remedy)
 }
 

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
 use robotcal::Code;
-use robotcal::detect::{detect, detect_series};
+use robotcal::detect::{Detection, Picture, detect, detect_series};
 use robotcal::series::{Plate, parse_plate};
 
 use crate::boards_scene::mirror;
-use crate::circles_support::{Scene, View, pose, scene, standard_plate};
+use crate::circles_support::{Scene, View, behind_mosaic, pose, scene, standard_plate};
 use crate::said::assert_says;
 
 const APRILGRID: &str = "kind = \"aprilgrid\"\ncolumns = 6\nrows = 6\ntag_m = 0.04\nspacing = 0.3";
@@ -252,5 +253,85 @@ fn a_row_that_no_image_shows_is_said() {
         let notices: Vec<_> = images.iter().flat_map(|i| &i.detection.notices).collect();
         assert_eq!(notices.len(), said, "{notices:?}");
         notices.iter().for_each(|n| assert_says(*n, Code::PlateLineHidden, &["7 x 6 tags", "rows"]));
+    }
+}
+
+/// Squared errors over the stated variances, mean per axis and its root, with the largest error, px; of an identified corner each.
+fn accuracy(scene: &Scene, found: &Detection) -> (f64, f64) {
+    let (mut sum, mut farthest) = (0.0, 0.0_f64);
+    for o in &found.observations {
+        let m = &scene.plate.markers[scene.plate.index_of(o.marker).unwrap()];
+        let truth = scene.camera.project(&scene.camera_from_plate.transform(&m.position_m)).unwrap();
+        let (d, c) = (nalgebra::Vector2::from(o.uv) - truth, o.covariance.unwrap());
+        sum += d.x * d.x / c[0] + d.y * d.y / c[2];
+        farthest = farthest.max(d.norm());
+    }
+    ((sum / (2 * found.observations.len().max(1)) as f64).sqrt(), farthest)
+}
+
+/// The mosaic of a colour sensor, and noise of 13 % of the step between ink and paper.
+#[test]
+fn tags_that_a_mosaic_or_noise_hides_are_found_in_a_smoothed_copy() {
+    let look = View { distance_m: 0.6, tilt_deg: 20.0, roll_deg: 30.0, ..View::default() };
+    for (text, corners) in [(APRILGRID, 144), (ARUCO, 140)] {
+        let scene = Scene { plate: plate(text), camera_from_plate: pose(&look), ..scene(&look) };
+        let (mosaic, mut noisy) = (behind_mosaic(scene.render(1)), scene.render(2));
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let grain = Normal::new(0.0_f32, 22.0).unwrap();
+        noisy.pixels.iter_mut().for_each(|v| *v = (*v + 22.0 + grain.sample(&mut rng)).round().clamp(0.0, 255.0));
+        for (what, picture) in [("mosaic", mosaic), ("noise", noisy)] {
+            let found = detect(&picture, &scene.plate).unwrap_or_else(|e| panic!("{text} {what}: {e}"));
+            let (normalised, farthest) = accuracy(&scene, &found);
+            println!(
+                "{what}: {} corners, normalised {normalised:.2}, farthest {farthest:.3} px",
+                found.observations.len()
+            );
+            assert!(found.observations.len() as f64 >= 0.9 * f64::from(corners), "{text} {what}");
+            assert!(normalised < 1.5 && farthest < 0.6, "{text} {what}: {normalised} {farthest}");
+            assert!(found.notices.iter().any(|n| n.code == Code::MarkersSmoothed) || what == "noise");
+        }
+    }
+}
+
+/// A border of one module, blurred by a quarter to half a module: the light of the code shines through it.
+#[test]
+fn blurred_tags_with_a_narrow_border_are_as_uncertain_as_stated() {
+    let text = "kind = \"aruco-grid\"\ncolumns = 6\nrows = 6\nmarker_m = 0.04\ngap_m = 0.012\n\
+                dictionary = \"DICT_APRILTAG_36h11\"";
+    for share in [0.25, 0.3, 0.4] {
+        let tally = run_views(text, 0.72, |rng| {
+            let distance_m = rng.random_range(0.45..0.8);
+            let mut view = View { distance_m, tilt_deg: rng.random_range(0.0..25.0), ..view(rng) };
+            view.aim_m = [0.0; 2];
+            // Beside the area of a pixel.
+            let blur_px = share * view.focal_px * 0.005 / distance_m;
+            view.conditions.psf_sigma_px = (blur_px * blur_px - 1.0 / 12.0).sqrt();
+            view
+        });
+        assert_eq!(tally.wrong, 0, "{share}");
+        assert!(tally.found as f64 >= 0.6 * tally.visible as f64 && tally.normalised < 1.3, "{share}: {tally:?}");
+    }
+}
+
+/// Two equal boards side by side: which is the plate cannot be told; where one of them is cut, the whole one is taken, and that is said.
+#[test]
+fn two_equal_boards_in_view_are_named() {
+    let look = View { distance_m: 0.9, tilt_deg: 10.0, roll_deg: 5.0, ..View::default() };
+    let stated = plate(ARUCO);
+    let one = Scene { plate: stated.clone(), camera_from_plate: pose(&look), ..scene(&look) }.render(1);
+    let beside = |width: usize| {
+        let rows = one.pixels.chunks_exact(one.width);
+        let pixels = rows.flat_map(|row| [row, &row[..width]].concat()).collect();
+        Picture { width: one.width + width, pixels, ..one }
+    };
+    let error = detect(&beside(one.width), &stated).expect_err("two boards");
+    assert_eq!(error.code, Code::PlateTwice, "{error}");
+    let found = detect(&beside(one.width / 2), &stated).unwrap();
+    let alone = detect(&one, &stated).unwrap();
+    assert!(alone.notices.is_empty() && alone.observations.len() == 140, "{:?}", alone.notices);
+    assert!(found.notices.iter().any(|n| n.code == Code::PlateTwice), "{:?}", found.notices);
+    assert_eq!(found.observations.len(), 140);
+    for (a, b) in found.observations.iter().zip(&alone.observations) {
+        assert!(a.marker == b.marker && (0..2).all(|k| (a.uv[k] - b.uv[k]).abs() < 0.05), "{a:?} {b:?}");
     }
 }

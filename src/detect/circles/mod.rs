@@ -32,6 +32,7 @@ pub use measuring::measure::measure;
 pub use measuring::predicted::Predicted;
 pub use measuring::predicted_pass::{detect_predicted, measure_predicted};
 pub use pipeline::detect;
+pub(super) use smoothed::{smoothed, variance_factor};
 pub use types::{
     CircleDetection, DroppedCandidate, Found, Imaged, InnerOuter, LOPSIDED_PX, Measured, Options, Outcome, Reason,
 };

@@ -25,7 +25,7 @@ pub(super) const SMOOTHINGS_PX: [f64; 2] = [0.7, 1.0];
 const REACH: f64 = 4.0;
 
 /// A copy of the picture, smoothed by a Gaussian of `sigma_px`; none of its pixels counts as saturated.
-pub(super) fn smoothed(picture: &Picture, sigma_px: f64) -> Picture {
+pub(in crate::detect) fn smoothed(picture: &Picture, sigma_px: f64) -> Picture {
     let kernel = kernel(sigma_px);
     let (width, height) = (picture.width, picture.height);
     let across = along_rows(&picture.pixels, width, &kernel);
@@ -63,7 +63,7 @@ fn transposed(pixels: &[f32], width: usize) -> Vec<f32> {
 }
 
 /// By what the variance of a place exceeds that of noise that was white in the smoothed picture, where its edge has this blur.
-pub(super) fn variance_factor(edge_px: f64, sigma_px: f64) -> f64 {
+pub(in crate::detect) fn variance_factor(edge_px: f64, sigma_px: f64) -> f64 {
     if sigma_px > 0.0 { edge_px / edge_px.hypot(sigma_px) / kept(sigma_px) } else { 1.0 }
 }
 

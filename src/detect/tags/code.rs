@@ -58,6 +58,11 @@ impl Reader {
         self.border
     }
 
+    /// Whether a module of the code of a tag is light, by row and column from the top-left as printed.
+    pub fn is_light(&self, id: u32, row: usize, column: usize) -> bool {
+        self.codes.get(id as usize).is_some_and(|code| code >> (row * self.bits + column) & 1 == 0)
+    }
+
     fn wrong_allowed(&self) -> u32 {
         (self.bits * self.bits / ONE_WRONG_IN) as u32
     }

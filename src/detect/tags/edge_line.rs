@@ -3,9 +3,13 @@
 //! With x along the side from its middle and y across it, towards the light, px:
 //!
 //! ```text
-//! I = min(full scale, d(x) + h(x) Phi((y - e(x)) / s))
+//! I = min(full scale, d(x) + h(x) (Phi((y - e(x)) / s) + B(x, e(x) - y)))
 //! e(x) = o + a x + c x^2,  h(x) = h0 + h1 x,  d(x) = d0 + d1 x + d2 x^2
+//! B(x, t) = sum of step (Phi((x - x0) / s) - Phi((x - x1) / s)) (Phi((t - t0) / s) - Phi((t - t1) / s))
 //! ```
+//!
+//! `B` is what lies beside the side, in rectangles: light modules of the code within a border of one module, and the next tag. It counts where
+//! the blur is a fifth of the border, or about that, or more, and is laid again, for the side and the blur that were found, until these rest.
 //!
 //! `c` carries what lens distortion bends, with a prior of [`BEND`] per picture width; everything else is free but for wide priors.
 //! Glare adds the same to ink and paper: where it clips the paper, the curve of the ink says where half of the step is. The ends
@@ -40,6 +44,12 @@ const LEVEL: f64 = 0.3;
 const SLOPE_PER_PX: f64 = 0.01;
 /// What lies beyond ink and paper is seen so many blurs before it: at two by 2 % of the contrast.
 const CLEAR_OF_BLURS: f64 = 2.0;
+/// Blur over the width of the ink from which what lies beyond it is seen within.
+const SHINES_THROUGH: f64 = 0.18;
+/// Times that what lies beside a side is laid again.
+const MOST_ROUNDS: usize = 8;
+/// Beyond so many blurs an edge is over.
+const FAR_BLURS: f64 = 8.0;
 /// A side that moves further than this part of its length, or by more than this many px, is another edge.
 const FARTHEST: f64 = 0.1;
 const FARTHEST_PX: f64 = 3.0;
@@ -54,6 +64,31 @@ pub struct Side {
     /// How far ink and paper reach beside it undisturbed, px.
     pub ink_px: f64,
     pub paper_px: f64,
+}
+
+/// A rectangle of paper in the ink beside a side, or of ink in its paper.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside {
+    /// From and to along the side, from its middle, px.
+    pub along_px: [f64; 2],
+    /// From and to across it, towards the ink, px from the line through its ends.
+    pub depth_px: [f64; 2],
+    /// Its step over that of the side: 1 for paper, -1 for ink.
+    pub step: f64,
+}
+
+impl Beside {
+    /// Its part in the light of a place, that of the side being 1.
+    fn light(&self, along: f64, depth: f64, blur_px: f64) -> f64 {
+        let within = |at: f64, [from, to]: [f64; 2]| beyond(at - from, blur_px) - beyond(at - to, blur_px);
+        self.step * within(along, self.along_px) * within(depth, self.depth_px)
+    }
+}
+
+/// Share of the light so far beyond an edge.
+fn beyond(px: f64, blur_px: f64) -> f64 {
+    let (tail, _) = normal_tail((px / blur_px).clamp(-FAR_BLURS, FAR_BLURS) as f32);
+    1.0 - f64::from(tail)
 }
 
 /// A measured side.
@@ -77,6 +112,9 @@ struct Fit {
     paper_residual: f64,
     contrast: f64,
     dark: f64,
+    blur_px: f64,
+    /// Whether what lies beside it is seen within.
+    is_lit: bool,
 }
 
 struct Pixel {
@@ -84,14 +122,17 @@ struct Pixel {
     y: f64,
     value: f64,
     saturated: bool,
+    /// Share of the step that comes from beside.
+    light: f64,
 }
 
 impl EdgeLine {
-    /// Measures a side whose light lies to the left on the way from `from` to `to` (in the picture, rows downwards).
+    /// Measures a side whose light lies to the left on the way from `from` to `to` (in the picture, rows downwards); `beside` tells what
+    /// may shine through its ink, and is asked only where that is seen.
     ///
     /// # Errors
     /// Why there is no such side.
-    pub fn fit(picture: &Picture, side: &Side) -> Result<Self, &'static str> {
+    pub fn fit(picture: &Picture, side: &Side, beside: impl Fn() -> Vec<Beside>) -> Result<Self, &'static str> {
         let (from, to) = (Vector2::from(side.from), Vector2::from(side.to));
         let length = (to - from).norm();
         let along = (to - from) / length;
@@ -100,21 +141,63 @@ impl EdgeLine {
             along,
             across: Vector2::new(along.y, -along.x),
             shape: Vector3::zeros(),
-            fit: Fit { covariance: SMatrix::zeros(), paper_residual: 0.0, contrast: 0.0, dark: 0.0 },
+            fit: Fit {
+                covariance: SMatrix::zeros(),
+                paper_residual: 0.0,
+                contrast: 0.0,
+                dark: 0.0,
+                blur_px: 0.0,
+                is_lit: false,
+            },
         };
         let mut state = Column::zeros();
         state[3] = USUAL_BLUR_PX.ln();
+        let mut around: Option<Vec<Beside>> = None;
         // the band is laid again where the first fit found the side, as wide as its blur asks for
-        for round in 0..2 {
+        for round in 0..MOST_ROUNDS {
+            let before = state;
             line.shape = Vector3::new(state[0], state[1], state[2]);
-            let pixels = line.band(picture, side, length, state[3].exp())?;
+            let mut pixels = line.band(picture, side, length, state[3].exp())?;
             if round == 0 {
                 start(&pixels, &mut state)?;
+            } else if around.is_some() || state[3].exp() > SHINES_THROUGH * side.ink_px {
+                line.lighten(&mut pixels, around.get_or_insert_with(&beside), state[3].exp());
             }
             line.fit = iterate(picture, &pixels, length, &mut state)?;
+            let is_lit = around.as_ref().is_some_and(|around| !around.is_empty());
+            line.fit.is_lit = is_lit;
+            let moved = state - before;
+            let moved_px = moved[0].abs() + moved[1].abs() * length / 2.0 + moved[3].abs() * state[3].exp();
+            if round > 0 && (!is_lit || moved_px < NEARLY_AT_REST_PX) {
+                line.shape = Vector3::new(state[0], state[1], state[2]);
+                return Ok(line);
+            }
         }
-        line.shape = Vector3::new(state[0], state[1], state[2]);
-        Ok(line)
+        Err("no convergence")
+    }
+
+    /// Adds to pixels what shines into them from beside.
+    fn lighten(&self, pixels: &mut [Pixel], around: &[Beside], blur_px: f64) {
+        for p in pixels {
+            let depth = self.offset(p.x) - p.y;
+            p.light = around.iter().map(|one| one.light(p.x, depth, blur_px)).sum();
+        }
+    }
+
+    /// Whether what lies beside the side was seen within its ink.
+    pub fn is_lit(&self) -> bool {
+        self.fit.is_lit
+    }
+
+    /// The side when its covariance is so many times as large.
+    pub fn widened(mut self, factor: f64) -> Self {
+        self.fit.covariance *= factor;
+        self
+    }
+
+    /// Sigma of the blur, px.
+    pub fn blur_px(&self) -> f64 {
+        self.fit.blur_px
     }
 
     /// The pixels of the band: without the ends, and as far to both sides as nothing disturbs.
@@ -140,7 +223,7 @@ impl EdgeLine {
                 let beside = y - self.offset(x);
                 if x.abs() <= half && beside >= -inner && beside <= outer {
                     let value = picture.at(u, v);
-                    pixels.push(Pixel { x, y, value: f64::from(value), saturated: value >= limit });
+                    pixels.push(Pixel { x, y, value: f64::from(value), saturated: value >= limit, light: 0.0 });
                 }
             }
         }
@@ -261,7 +344,7 @@ fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column)
         if step[0].abs() + step[1].abs() * length / 2.0 < rest {
             let (contrast, paper_residual) = (state[4], (paper.0 / paper.1.max(1.0)).sqrt());
             let covariance = factor.inverse().fixed_view::<3, 3>(0, 0).into_owned();
-            let fit = Fit { covariance, paper_residual, contrast, dark: state[6] };
+            let fit = Fit { covariance, paper_residual, contrast, dark: state[6], blur_px: blur, is_lit: false };
             return if noise < WORST * contrast { Ok(fit) } else { Err("disturbed surroundings") };
         }
     }
@@ -285,7 +368,7 @@ fn sums(pixels: &[Pixel], state: &Column, full_scale: f32) -> Sums {
         let u = (p.y - state[0] - p.x * (state[1] + p.x * state[2])) / blur;
         let (step, dark) = (state[4] + state[5] * p.x, state[6] + p.x * (state[7] + p.x * state[8]));
         let (tail, phi) = normal_tail(u as f32);
-        let share = 1.0 - f64::from(tail);
+        let share = 1.0 - f64::from(tail) + p.light;
         let value = dark + step * share;
         if p.saturated && value >= limit {
             continue; // says no more than that

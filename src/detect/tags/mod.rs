@@ -8,9 +8,10 @@
 //!
 //! ```text
 //! quads (quadrilaterals) -> code, scan (what is written in them) -> layout (do the neighbours agree)
-//!         -> edge_line, misfit (sides, and what disturbs them) -> pipeline (the stages in their order) -> seen (what stands there instead)
+//!         -> edge_line, beside, misfit (sides, and what disturbs them) -> pipeline (the stages in their order) -> seen (what stands there instead)
 //! ```
 
+mod beside;
 pub(super) mod code;
 mod edge_line;
 pub(super) mod layout;

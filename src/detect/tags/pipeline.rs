@@ -1,20 +1,29 @@
 //! The detector: the stages in their order.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use super::beside::Printed;
 use super::code::{Reader, SURE_BITS};
 use super::edge_line::{EdgeLine, Measured, Side};
 use super::layout::{Layout, Tagged};
 use super::misfit::Usual;
-use super::quads::Quad;
+use super::quads::{Quad, distance, middle};
 use super::scan::{certain, corners, passes, read_pass, scan};
 use super::seen::{MEASURED, contradiction, gap_contradiction, instead};
+use crate::detect::circles::{smoothed, variance_factor};
+use crate::detect::detection::smoothed_notice;
 use crate::detect::{Detection, Dropped, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::geom::PlaneMap;
 use crate::linalg::median;
-use crate::series::{Edge, Observation, Plate, PlateKind, TagPrint, Tags};
+use crate::series::{Edge, Observation, Plate, TagPrint, Tags};
 
+/// Sigma with which a picture is smoothed in which tags are lost as it is, px: of a mosaic of colours and of moire nothing is left.
+const SMOOTHING_PX: f64 = 1.2;
+/// Fewer tags than this are not all, as a rule.
+const FEW: usize = 4;
+/// Tags that are seen twice: one may be misread.
+const LEAST_TWICE: usize = 2;
 /// Sides that must say by how much ink has grown before they are believed.
 const LEAST_GROWN: usize = 8;
 /// Tags that say where another one stands.
@@ -29,32 +38,30 @@ type Sides = BTreeMap<usize, [Measured; 4]>;
 
 /// Finds the tags of a plate and measures their corners; tags may be out of view or covered.
 ///
-/// Positions in px with (0, 0) at the centre of the top-left pixel.
+/// Positions in px with (0, 0) at the centre of the top-left pixel. Where few tags are found, or few of their corners can be measured, as in noise, behind the
+/// mosaic of a colour sensor or after sharpening, they are sought and measured in a smoothed copy of the picture.
 ///
 /// # Errors
-/// A dictionary that is not known; no tag of the plate in the picture; a mirrored picture.
+/// A dictionary that is not known; no tag of the plate in the picture; every tag in it twice; a mirrored picture.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let tags = plate.tags.as_ref().ok_or_else(no_tags)?;
-    let board = Board::of(picture, plate, tags)?;
-    let seen = board.read();
-    if let Some(error) = contradiction(plate, tags, &seen) {
-        return Err(error);
+    let board = Board::of(picture, plate, tags, 0.0)?;
+    let mut best = board.look()?;
+    if !best.as_ref().is_some_and(|found| board.is_enough(found)) {
+        let smooth = smoothed(picture, SMOOTHING_PX);
+        let better = match Board::of(&smooth, plate, tags, SMOOTHING_PX)?.look() {
+            Err(error) if best.is_none() => return Err(error),
+            other => other.ok().flatten(),
+        };
+        let corners = |found: &Option<Detection>| found.as_ref().map(|d| d.observations.len());
+        if corners(&better) > corners(&best) {
+            best = better;
+        }
     }
-    let mut detection = Detection::default();
-    let mut found: Found =
-        seen.into_iter().filter_map(|(id, corners)| Some((*board.places.get(&id)?, corners))).collect();
-    board.check(&mut found, &mut detection.dropped);
-    if found.is_empty() {
-        return Err(board.why_nothing());
-    }
-    board.complete(&mut found);
-    board.measure(&found, &mut detection);
-    detection.outline = board.outline(&found);
-    let measured = Layout::of(&whole(&detection.observations));
-    match gap_contradiction(tags, &measured, &MEASURED) {
-        Some(error) => Err(error),
-        None if detection.observations.is_empty() => Err(nothing(tags)),
-        None => Ok(detection),
+    match best {
+        None => Err(board.why_nothing()),
+        Some(found) if found.observations.is_empty() => Err(nothing(tags)),
+        Some(found) => Ok(found),
     }
 }
 
@@ -65,31 +72,68 @@ struct Board<'a> {
     reader: Reader,
     /// Places of the tags by their numbers.
     places: BTreeMap<u32, usize>,
+    /// Sigma with which the picture was smoothed, px.
+    smoothing_px: f64,
 }
 
 impl<'a> Board<'a> {
-    fn of(picture: &'a Picture, plate: &'a Plate, tags: &'a Tags) -> Result<Self> {
+    fn of(picture: &'a Picture, plate: &'a Plate, tags: &'a Tags, smoothing_px: f64) -> Result<Self> {
         let count = plate.columns * plate.rows;
         let reader = Reader::of(tags, &tags.dictionary("plate", count)?);
         let number = |place: u32| tags.tag_at(place, plate.columns, plate.rows).0;
         let places = (0..count).map(|place| (number(place), place as usize)).collect();
-        Ok(Self { picture, plate, tags, reader, places })
+        Ok(Self { picture, plate, tags, reader, places, smoothing_px })
+    }
+
+    /// What is found in the picture, measured or not; `None` where there is none of the tags.
+    fn look(&self) -> Result<Option<Detection>> {
+        let (seen, twice) = self.read();
+        if let Some(error) = contradiction(self.plate, self.tags, &seen) {
+            return Err(error);
+        }
+        let mut detection = Detection::default();
+        let mut found: Found =
+            seen.into_iter().filter_map(|(id, corners)| Some((*self.places.get(&id)?, corners))).collect();
+        self.check(&mut found, &mut detection.dropped);
+        let is_twice = twice.len() >= LEAST_TWICE.min(self.count());
+        if found.is_empty() {
+            return if is_twice { Err(all_twice(&twice)) } else { Ok(None) };
+        }
+        self.complete(&mut found);
+        self.measure(&found, &mut detection);
+        detection.outline = self.outline(&found);
+        detection.notices.extend(is_twice.then(|| some_twice(&twice)));
+        if self.smoothing_px > 0.0 {
+            detection.notices.push(smoothed_notice(found.len(), found.len()));
+        }
+        let measured = Layout::of(&whole(&detection.observations));
+        match gap_contradiction(self.tags, &measured, &MEASURED) {
+            Some(error) => Err(error),
+            None => Ok(Some(detection)),
+        }
+    }
+
+    /// Whether a smoothed picture would hardly show more.
+    fn is_enough(&self, found: &Detection) -> bool {
+        let corners = found.observations.len();
+        corners >= found.dropped.len() && corners >= 2 * FEW.min(self.count())
     }
 
     fn count(&self) -> usize {
         self.places.len()
     }
 
-    /// Reads all quadrilaterals, until all tags of the plate are found.
-    fn read(&self) -> Tagged {
-        let mut found = BTreeMap::new();
+    /// Reads all quadrilaterals, until all tags of the plate are found; with those that are seen in two places.
+    fn read(&self) -> (Tagged, BTreeSet<u32>) {
+        let (mut found, mut twice) = (BTreeMap::new(), BTreeSet::new());
         for quads in passes(self.picture) {
-            read_pass(&quads, |quad| self.reader.read(self.picture, quad, false), &mut found);
+            twice.extend(read_pass(&quads, |quad| self.reader.read(self.picture, quad, false), &mut found));
             if self.places.keys().all(|id| found.contains_key(id)) {
                 break;
             }
         }
-        corners(&found)
+        twice.retain(|id| self.places.contains_key(id));
+        (corners(&found), twice)
     }
 
     /// Leaves out tags that do not stand where the others say; a single one must be sure of its code.
@@ -165,7 +209,7 @@ impl<'a> Board<'a> {
     }
 
     fn measure(&self, found: &Found, detection: &mut Detection) {
-        let sides: Sides = found.iter().map(|(place, corners)| (*place, self.sides(corners))).collect();
+        let sides: Sides = found.iter().map(|(place, corners)| (*place, self.sides(*place, corners))).collect();
         let (grown_px, usual) = (self.grown(found, &sides), Usual::of(sides.values().flatten().flatten()));
         for (place, four) in sides {
             let id = self.number(place);
@@ -202,13 +246,36 @@ impl<'a> Board<'a> {
         })
     }
 
-    fn sides(&self, corners: &Quad) -> [Measured; 4] {
+    /// The sides of a tag with these corners. Where its code shines through its border, once more with the corners that they have.
+    fn sides(&self, place: usize, corners: &Quad) -> [Measured; 4] {
+        let first = self.sides_from(place, corners);
+        if !first.iter().flatten().any(EdgeLine::is_lit) {
+            return first;
+        }
+        let corner = |k: usize| Some(crossing(first[(k + 3) % 4], first[k], corners[k]).ok()?.0);
+        match [corner(0), corner(1), corner(2), corner(3)] {
+            [Some(a), Some(b), Some(c), Some(d)] => self.sides_from(place, &[a, b, c, d]),
+            _ => first,
+        }
+    }
+
+    fn sides_from(&self, place: usize, corners: &Quad) -> [Measured; 4] {
+        let printed = self.print_of(place);
         [0, 1, 2, 3].map(|k: usize| {
             let (from, to) = (corners[k], corners[(k + 1) % 4]);
             let module = width(corners, k) / self.reader.side() as f64;
             let (ink_px, paper_px) = (module * self.reader.border() as f64, module * self.gap().min(2.0));
-            EdgeLine::fit(self.picture, &Side { from: to, to: from, ink_px, paper_px })
+            let side = Side { from: to, to: from, ink_px, paper_px };
+            let line = EdgeLine::fit(self.picture, &side, || printed.beside(corners, k))?;
+            Ok(line.widened(variance_factor(line.blur_px(), self.smoothing_px)))
         })
+    }
+
+    fn print_of(&self, place: usize) -> Printed<'_> {
+        let [columns, rows] = [self.plate.columns, self.plate.rows].map(|n| n as usize);
+        let (column, row) = (place % columns, place / columns);
+        let next = [row + 1 < rows, column + 1 < columns, row > 0, column > 0];
+        Printed { reader: &self.reader, id: self.number(place), gap: self.gap(), next }
     }
 
     /// Paper beside a tag, modules.
@@ -232,7 +299,7 @@ impl<'a> Board<'a> {
                     let end = [0, 1].map(|a| near[a] + share * (near[a] - far[a]));
                     // its light is where the ink of the tag is
                     let (from, to) = if near == corners[k] { (end, near) } else { (near, end) };
-                    let square = EdgeLine::fit(self.picture, &Side { from, to, ink_px: px, paper_px: px });
+                    let square = EdgeLine::fit(self.picture, &Side { from, to, ink_px: px, paper_px: px }, Vec::new);
                     grown.extend(square.map(|square| -0.5 * side.step_to(&square)));
                 }
             }
@@ -269,20 +336,12 @@ fn clockwise([a, b, c, d]: &Quad) -> Quad {
     [*d, *c, *b, *a]
 }
 
-fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
 /// Width of a tag across its side from corner `k` to the next, px: a tilted one is not as wide as it is long.
 fn width(corners: &Quad, k: usize) -> f64 {
     let [from, to, far, last] = [0, 1, 2, 3].map(|i| corners[(k + i) % 4]);
     let along = [to[0] - from[0], to[1] - from[1]];
     let across = |p: [f64; 2]| along[0] * (p[1] - from[1]) - along[1] * (p[0] - from[0]);
     (across(far) + across(last)).abs() / (2.0 * distance(from, to))
-}
-
-fn middle(q: &Quad) -> [f64; 2] {
-    [0, 1].map(|a| q.iter().map(|p| p[a]).sum::<f64>() / 4.0)
 }
 
 fn drop_tag(found: &mut Found, place: usize, dropped: &mut Vec<Dropped>) {
@@ -298,6 +357,28 @@ fn no_tags() -> Error {
         "the plate does not say which tags it has",
         "give tag_m or marker_m and the other keys of the kind in plate.toml",
     )
+}
+
+fn twice_named(twice: &BTreeSet<u32>) -> String {
+    match (twice.first(), twice.last()) {
+        (Some(first), Some(last)) if first != last => {
+            format!("{} tags from {first} to {last} are seen twice", twice.len())
+        }
+        (first, _) => format!("tag {} is seen twice", first.copied().unwrap_or(0)),
+    }
+}
+
+const ONE_PLATE: &str =
+    "take the image so that one plate with these tags is in view, or print others with other numbers";
+
+fn all_twice(twice: &BTreeSet<u32>) -> Error {
+    let what = format!("{}: which of them are those of the plate cannot be told", twice_named(twice));
+    Error::new(Code::PlateTwice, "image", what, ONE_PLATE)
+}
+
+fn some_twice(twice: &BTreeSet<u32>) -> Notice {
+    let what = format!("{}: those are taken that stand where the others say", twice_named(twice));
+    Notice::new(Code::PlateTwice, "image", what, ONE_PLATE)
 }
 
 fn nothing(tags: &Tags) -> Error {
@@ -316,7 +397,7 @@ pub fn unseen_line(plate: &Plate) -> Notice {
             "an outer row or column of the {} x {} {} is not seen where it should be, in no image",
             plate.columns,
             plate.rows,
-            if plate.kind == PlateKind::Charuco { "inner corners" } else { "tags" }
+            if plate.tags.is_some() { "tags" } else { "inner corners" }
         ),
         "if nothing covers it, the board is smaller: correct columns and rows of the plate file, in whose middle its frame is",
     )

@@ -97,8 +97,13 @@ impl Line {
     }
 }
 
-fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+pub(super) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// Mean of the corners.
+pub(super) fn middle(q: &Quad) -> [f64; 2] {
+    [0, 1].map(|a| q.iter().map(|p| p[a]).sum::<f64>() / 4.0)
 }
 
 /// Twice the area of a triangle; positive where it turns clockwise on the screen.

@@ -1,18 +1,20 @@
 //! The tags of a dictionary in a picture, whatever the plate file says of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_targets_aruco::{Dictionary, builtins};
 
 use super::code::{Reader, Reading};
 use super::layout::{Layout, Tagged};
-use super::quads::{Quad, inverted, quads};
+use super::quads::{Quad, distance, inverted, middle, quads};
 use crate::detect::Picture;
 
 /// Largest tags, as shares of the picture's longer side, that are looked for one after the other (the threshold follows the light
 /// over this length), and thresholds between paper and ink: above the middle, where the crossing of two dark squares is light, and
 /// further up for squares that blur joins.
 const PASSES: [(f64, f32); 5] = [(0.1, 0.6), (0.3, 0.6), (0.9, 0.6), (0.1, 0.75), (0.3, 0.75)];
+/// Middles of two tags are further apart than this part of a side.
+const APART: f64 = 0.5;
 /// Tags whose numbers fit to their places: not by chance.
 const LEAST_IN_LAYOUT: usize = 4;
 
@@ -35,17 +37,33 @@ pub fn passes(picture: &Picture) -> impl Iterator<Item = Vec<Quad>> {
     PASSES.into_iter().map(move |(share, threshold)| quads(&inverted, share * longer, threshold))
 }
 
-/// Adds what the quadrilaterals of a pass say; of two that say the same none is known to be right.
-pub(super) fn read_pass(quads: &[Quad], read: impl Fn(&Quad) -> Option<Reading>, found: &mut BTreeMap<u32, Reading>) {
+/// Adds what the quadrilaterals of a pass say; of two that say the same none is known to be right. Numbers that are seen in two places.
+pub(super) fn read_pass(
+    quads: &[Quad],
+    read: impl Fn(&Quad) -> Option<Reading>,
+    found: &mut BTreeMap<u32, Reading>,
+) -> BTreeSet<u32> {
     let mut seen: BTreeMap<u32, Vec<Reading>> = BTreeMap::new();
     for reading in quads.iter().filter_map(read) {
         seen.entry(reading.id).or_default().push(reading);
     }
+    let mut twice = BTreeSet::new();
     for (id, readings) in seen {
+        let known = found.get(&id).or(readings.first()).copied();
+        if known.is_some_and(|known| readings.iter().any(|other| are_apart(&known.corners, &other.corners))) {
+            twice.insert(id);
+        }
         if let [reading] = &readings[..] {
             found.entry(id).or_insert(*reading);
         }
     }
+    twice
+}
+
+/// Whether two tags of a number lie beside each other.
+fn are_apart(one: &Quad, other: &Quad) -> bool {
+    let shortest = (0..4).map(|k| distance(one[k], one[(k + 1) % 4])).fold(f64::MAX, f64::min);
+    distance(middle(one), middle(other)) > APART * shortest
 }
 
 /// What all quadrilaterals say, in print or in a mirror.
