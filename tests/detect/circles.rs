@@ -1,6 +1,6 @@
 //! The circle detector on rendered pictures with known truth.
 
-use crate::circles_support::{View, errors, report, scene};
+use crate::circles_support::{View, behind_mosaic, errors, report, scene};
 use crate::grids::jpeg;
 use robotcal::Code;
 use robotcal::detect::Detection;
@@ -125,4 +125,16 @@ fn markers_that_are_all_saturated_are_a_failure() {
     let dropped = all[third..].iter().map(lost(Reason::Saturated)).collect();
     let part = Detection::from(CircleDetection { dropped, found: all[..third].to_vec(), ..seen.clone() });
     assert!(part.failure.is_none() && is_told(&part), "{:?}", part.notices);
+}
+
+/// Raw values of a colour sensor taken for grey.
+#[test]
+fn markers_behind_a_mosaic_of_colours_are_found_in_a_smoothed_copy() {
+    let scene = scene(&tilted());
+    let picture = behind_mosaic(scene.render(6));
+    let found = detect(&picture, &scene.plate, &Options::default()).unwrap();
+    let e = errors(&scene, &found);
+    report(&scene, &found, &e);
+    assert_eq!((e.wrong, found.smoothed), (0, found.found.len()));
+    assert!(e.found as f64 >= 0.9 * e.visible as f64 && e.rms() < 0.05, "{} of {}: {}", e.found, e.visible, e.rms());
 }

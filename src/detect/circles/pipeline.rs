@@ -52,13 +52,17 @@ pub fn detect(picture: &Picture, plate: &Plate, options: &Options) -> Result<Cir
     };
     let mut best = look(picture, 0.0)?;
     for sigma_px in SMOOTHINGS_PX {
-        let reasons = best.spoilt_by();
-        if reasons.is_empty() {
+        let (reasons, is_unseen) = (best.spoilt_by(), best.outcome.is_unseen());
+        if reasons.is_empty() && !is_unseen {
             break;
         }
         let mut others = as_before(look(&smoothed(picture, sigma_px), sigma_px)?, sigma_px);
         allow_for_glare(&mut others, picture.full_scale, sigma_px);
-        best.complete(others, reasons);
+        if !is_unseen {
+            best.complete(others, reasons);
+        } else if !others.found.is_empty() {
+            best = CircleDetection { smoothed: others.found.len(), ..others };
+        }
     }
     Ok(best)
 }

@@ -199,6 +199,11 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// Whether noise or a mosaic of colours may hide the markers.
+    pub(super) fn is_unseen(self) -> bool {
+        matches!(self, Self::NoCandidates | Self::NoLattice | Self::Ambiguous)
+    }
+
     /// What went wrong and what to try; `None` where markers were identified.
     pub(in crate::detect) fn failure(self) -> Option<(Code, &'static str, &'static str)> {
         match self {
