@@ -133,7 +133,7 @@ fn a_covered_line_leaves_the_other_corners() {
     let all = detect(&picture, &plate).unwrap();
     let last = all.observations.iter().map(|o| o.uv[0]).fold(0.0, f64::max);
     let first = all.observations.iter().map(|o| o.uv[0]).fold(f64::MAX, f64::min);
-    let begin = last - 0.28 * (last - first);
+    let begin = last - 0.19 * (last - first);
     let width = picture.width;
     for (k, value) in picture.pixels.iter_mut().enumerate().filter(|(k, _)| (k % width) as f64 > begin) {
         *value = 70.0 + (k / width % 7) as f32;

@@ -47,7 +47,7 @@ const CLEAR_OF_BLURS: f64 = 2.0;
 /// Blur over the width of the ink from which what lies beyond it is seen within.
 const SHINES_THROUGH: f64 = 0.18;
 /// Times that what lies beside a side is laid again.
-const MOST_ROUNDS: usize = 8;
+const MOST_ROUNDS: usize = 12;
 /// Beyond so many blurs an edge is over.
 const FAR_BLURS: f64 = 8.0;
 /// A side that moves further than this part of its length, or by more than this many px, is another edge.

@@ -149,8 +149,9 @@ impl<'a> Board<'a> {
         }
         if let (1, Some(place)) = (found.len(), found.keys().next().copied()) {
             let again = self.reader.read(self.picture, &clockwise(&found[&place]), false);
-            let sure =
-                again.is_some_and(|r| r.wrong == 0 && (self.count() == 1 || self.reader.is_sure(0, self.count())));
+            // Smoothed, the picture has been looked at twice.
+            let is_alone = self.count() == 1 && self.smoothing_px == 0.0;
+            let sure = again.is_some_and(|r| r.wrong == 0 && (is_alone || self.reader.is_sure(0, self.count())));
             if !sure {
                 drop_tag(found, place, dropped);
             }
