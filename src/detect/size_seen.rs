@@ -106,6 +106,12 @@ pub(super) fn nowhere_whole(plate: &Plate) -> Notice {
     )
 }
 
+/// What to say of one of two equal plates.
+pub(super) fn twin() -> Notice {
+    let what = "two equal plates are in view, of which one is taken";
+    Notice::new(Code::PlateTwice, "image", what, "take the image so that the stated one alone is in view")
+}
+
 /// A board may be turned by a quarter: the order of the two numbers in which one of them is as stated, or the larger comes first where it is
 /// stated first.
 fn as_stated([a, b]: [u32; 2], [columns, rows]: [u32; 2]) -> [u32; 2] {

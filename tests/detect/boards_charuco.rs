@@ -324,11 +324,13 @@ fn a_wrong_first_marker_is_named_where_the_board_fits_moved() {
 
 #[test]
 fn two_equal_boards_are_said() {
-    let one = charuco_scene(0.1).render(0);
-    let pixels = one.pixels.chunks_exact(one.width).flat_map(|row| [row, row].concat()).collect();
-    let two = Picture { width: 2 * one.width, pixels, ..one };
-    let plate = charuco_plate(Some(("DICT_4X4_50", 0.7)));
-    let found = detect(&two, &plate).unwrap();
-    assert!(!found.observations.is_empty());
-    assert!(found.notices.iter().any(|n| n.code == Code::PlateTwice), "{:?}", found.notices);
+    let (grid, dots) = dots("symmetric", &[12]);
+    for (plate, scene) in [(charuco_plate(Some(("DICT_4X4_50", 0.7))), charuco_scene(0.1)), (grid, dots)] {
+        let one = scene.render(0);
+        let pixels = one.pixels.chunks_exact(one.width).flat_map(|row| [row, row].concat()).collect();
+        let two = Picture { width: 2 * one.width, pixels, ..one };
+        let found = detect(&two, &plate).unwrap();
+        assert!(!found.observations.is_empty());
+        assert!(found.notices.iter().any(|n| n.code == Code::PlateTwice), "{:?}", found.notices);
+    }
 }

@@ -15,6 +15,7 @@ use super::sizes::{best_of_sizes, on_picture};
 use crate::detect::corners::{Window, measure};
 use crate::detect::pictures::bytes::Bytes;
 use crate::detect::shared::KEEP_OFF_PX;
+use crate::detect::size_seen::twin;
 use crate::detect::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::geom::PlaneMap;
@@ -88,7 +89,7 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
 /// The refusal of a board whose markers, all that are in view, are not those that the plate file has at their places.
 fn numbers_contradict(picture: &Picture, plate: &Plate, board: BoardSize, found: &Found) -> Option<Result<Detection>> {
     let stated = plate.aruco.as_ref().map_or(0, |aruco| aruco.first_id);
-    match contradiction(picture, &found.lattice, &found.print, board)? {
+    match contradiction(picture, &found.lattice, (&found.print, found.markers), board)? {
         Contradiction::Counts(Counting { first_id, legacy }) if first_id == stated => {
             let is_other = plate.aruco.as_ref().is_some_and(|aruco| aruco.legacy != legacy);
             is_other.then(|| Ok(Detection::other_size(other_layout(legacy))))
@@ -213,12 +214,6 @@ fn found_print(print: &Print) -> Notice {
             }
         },
     )
-}
-
-fn twin() -> Notice {
-    let what = "two boards with the same markers are in view: one of them is taken";
-    let remedy = "take the image so that one plate with these markers is in view, or print others with other numbers";
-    Notice::new(Code::PlateTwice, "image", what, remedy)
 }
 
 fn not_found(plate: &Plate) -> String {

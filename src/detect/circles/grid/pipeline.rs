@@ -23,7 +23,7 @@ use crate::detect::circles::measuring::glare::allow_for_glare;
 use crate::detect::circles::pipeline::{Cut, Identified, detect_coded};
 use crate::detect::circles::smoothed::{SMOOTHINGS_PX, as_before, smoothed};
 use crate::detect::circles::types::{CircleDetection, Options, Outcome, Reason};
-use crate::detect::size_seen::{Counted, beyond, other_rows, other_size};
+use crate::detect::size_seen::{Counted, beyond, other_rows, other_size, twin};
 use crate::detect::{Detection, Outline, Picture, Sizes};
 use crate::error::{Code, Error, Notice, Result};
 use crate::linalg::median;
@@ -63,6 +63,7 @@ pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Resul
     }
     let mut detection = Detection::from(best);
     detection.say(&facts);
+    detection.notices.extend(facts.has_twin.then(twin));
     if let Some(circles) = &mut detection.circles {
         circles.sizes = facts.sizes;
     }
@@ -111,6 +112,8 @@ struct Facts {
     cut: bool,
     /// The outer lines of the plate.
     outer: Vec<Vec<Outer>>,
+    /// Another grid has as many rows and columns.
+    has_twin: bool,
 }
 
 /// A plate of dots on a square lattice.
@@ -246,6 +249,8 @@ impl<'a> Grid<'a> {
             facts.unstated = if laid.iter().all(|l| others(l, &larger) == here) { Vec::new() } else { here };
         }
         facts.outer = self.outer(&view, chosen);
+        let size_of = |lattice| View { picture, lattice, candidates }.shape()?.0.columns_and_rows();
+        facts.has_twin = lattices.get(1).and_then(size_of).is_some_and(|size| facts.size == Some(size));
         Ok((self.identified(plate, board, outcome)?, facts))
     }
 
