@@ -185,7 +185,7 @@ impl Kind for JointNoiseLarge {
             }
             _ if self.by_images => "look for a loose camera or plate, motion, autofocus, a wrong URDF",
             _ => {
-                "look for a loose tracker or target, rows of other stops, motion, a larger sigma than is stated, a wrong URDF"
+                "look for a loose tracker or target, rows of other stops, motion, a larger sigma than is stated, a joint near its target that counts the other way, a wrong URDF"
             }
         };
         remedy.into()

@@ -481,6 +481,8 @@ fn a_reflector_that_was_set_elsewhere_is_named_with_the_stop_by_its_points() {
         let BodySeen::Point(at) = &mut seen.seen else { panic!("points") };
         *at += tracker_from_base.rotation * tip.rotation * off;
     }
+    let said = identify(world.chain.clone(), std::slice::from_ref(&series), &Options::default()).map(|_| ());
+    assert_says(&said.unwrap_err(), Code::TargetDisplaced, &["reflector"]);
     let (code, stop, distance_m) = moved_at(series, &world.chain);
     assert_eq!((code, stop), (Code::TargetDisplaced, "024".to_owned()));
     assert!((distance_m - off.norm()).abs() < 0.01, "{distance_m}");
