@@ -39,7 +39,7 @@ mod two_stage;
 mod verify;
 
 pub use crate::model::joint_terms::RobotModel;
-pub use bodies::touch_mistakes::touch_mistake;
+pub use bodies::touch_mistakes::{mirror_image, touch_mistake};
 pub use controller::readings::{postures_are_computed, readings_of};
 pub use dry_run::dry_run;
 pub use estimator::Estimator;

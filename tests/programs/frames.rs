@@ -11,7 +11,7 @@ use robotcal::diagnose::{Finding, Weight};
 use robotcal::error::Code;
 use robotcal::frames::{Given, KnownRobot, Seen, Touches, fit};
 use robotcal::geom::Pose;
-use robotcal::identify::touch_mistake;
+use robotcal::identify::{mirror_image, touch_mistake};
 use robotcal::model::inverse::{reading_limits, solve_from};
 use robotcal::model::robot::Robot;
 use robotcal::output::frame_findings::frame_findings;
@@ -725,6 +725,24 @@ fn usual_mistakes_in_touches_are_named() {
     let near = fit(&robot, &good, &Given { tool: Some(Pose::new(Matrix3::identity(), tool)), plate: None }, &limits);
     assert!(near.unwrap().robot_sigmas > limits.sigmas_beyond_tolerance);
     assert!(fit(&robot, &good, &Given { tool: None, plate: None }, &limits).unwrap().robot_sigmas < 4.0);
+}
+
+/// A pin that nobody measured, touched roughly: the errors of the arm, by which it is no mirror image of itself, are below the touches.
+#[test]
+fn rough_touches_of_an_unknown_point_do_not_tell_an_arm_from_its_mirror_image() {
+    let World { robot, truth } = world();
+    let (given, limits) = (Given { tool: None, plate: None }, Limits::default());
+    let mut rng = rng(34);
+    let ambiguous = |touches: &Touches| {
+        let found = fit(&robot, touches, &given, &limits).unwrap();
+        mirror_image(&robot, touches, &given, (&found, &limits))
+    };
+    let mut rough = one_point(robot.exported(), &START, 8, &mut rng);
+    rough.all.iter_mut().for_each(|t| t.sigma_m = 3e-3);
+    assert_eq!(ambiguous(&rough).unwrap(), ["joint_a1", "joint_a4", "joint_a6"]);
+    let toucher = Toucher { truth: &truth, work: work(), tool: TOOL.into(), sigma_m: 5e-5, joint_sigma: 2e-5 };
+    let places = toucher.places(&spread(&ranges(&robot.stops), 16, &mut rng), "fixture", &mut rng);
+    assert_eq!(ambiguous(&places), None);
 }
 
 /// Touches of one place that are left out together: the place is wrong.

@@ -17,10 +17,10 @@ use crate::diagnose::{Mistake, Weight};
 use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, Seen, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
-use crate::identify::{measure_bodies, touch_mistake};
+use crate::identify::{measure_bodies, mirror_image, touch_mistake};
 use crate::output::corrections::{FileFinding, numbers};
 use crate::output::frame_files::{self, Frames, Named};
-use crate::output::frame_findings::{at_the_places, frame_findings};
+use crate::output::frame_findings::{at_the_places, frame_findings, mirror_image_fits};
 use crate::output::frames_record::{
     self, FILE_NAME, FORMAT, FramesRecord, KnowledgeRecord, RobotOfFrames, ToolKind, ToolRecord, TouchRecord, WorkKind,
     WorkRecord, checks, flat, rows,
@@ -105,6 +105,8 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     findings.extend(
         zeros.as_ref().and_then(|z| other_zeros((&fitted, z), (&robot, &touches, &given), &found.limits, &subject)),
     );
+    let mirrored = mirror_image(&robot, &touches, &given, (&fitted, &found.limits));
+    findings.extend(mirrored.map(|joints| mirror_image_fits(&joints, &subject)));
     findings.extend(from_below(robot.exported(), (&fitted, &touches), &found.limits, &subject));
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
     let made = FramesRecord {

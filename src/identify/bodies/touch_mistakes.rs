@@ -19,7 +19,10 @@ use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touch, Touches, closed_fo
 use crate::geom::{Pose, log_so3, rigid_fit};
 use crate::identify::mistakes::likeliest::{Explained, likeliest};
 use crate::identify::mistakes::misread::all_misread;
-use crate::identify::mistakes::readings::{Undone as ReadingsUndone, mirrored_signs_undone, mistakes_undone};
+use crate::identify::mistakes::readings::{
+    Undone as ReadingsUndone, mirrored_signs_undone, mistakes_undone, signs_of_others,
+};
+use crate::model::mirror::mirror_images;
 use crate::problem::BodySeen;
 
 /// Of mistakes of one kind, those that are fitted: the closed form fits them best.
@@ -113,6 +116,28 @@ pub fn touch_mistake(
     }
 }
 
+/// The joints with whose signs changed touches that fit the robot fit it as well: they do not tell it from its mirror image. `None` where they do.
+pub fn mirror_image(
+    robot: &KnownRobot,
+    touches: &Touches,
+    given: &Given,
+    (found, limits): (&FrameFit, &Limits),
+) -> Option<Vec<String>> {
+    let fits = |fit: &FrameFit| fit.contradiction(limits) <= limits.touch_factor;
+    if touches.all.is_empty() || !fits(found) {
+        return None;
+    }
+    let own = robot.exported();
+    mirror_images(&own.chain, limits.suspicious_misfit).into_iter().find_map(|mirror| {
+        let mut otherwise = touches.clone();
+        for posture in &mut otherwise.postures {
+            mirror.iter().for_each(|&k| posture.readings[k] = -posture.readings[k]);
+        }
+        let other = fit(robot, &otherwise, given, limits).ok()?;
+        (fits(&other) && left_out(&other) == left_out(found)).then(|| signs_of_others(own, &[], &mirror))
+    })
+}
+
 /// With the stops that fit no more beside it.
 fn mistake(touches: &Touches, kind: MistakeKind, (misfit, left): (f64, f64), beside: &[String]) -> Mistake {
     let frame = touches.frame.as_ref().map_or_else(String::new, |frame| format!(" in frame {frame}"));
@@ -187,10 +212,10 @@ fn explained(
 
 /// The best of those that explain: of readings and axes with what fits alike.
 fn best_of(mut all: Vec<(FrameFit, Undone)>, robot: &KnownRobot, limits: &Limits) -> Option<(FrameFit, Undone)> {
-    let (left_out, takes_more, _) = all.iter().map(|found| rank(found, limits)).min_by(|a, b| by_rank(*a, *b))?;
+    let (fewest_out, takes_more, _) = all.iter().map(|found| rank(found, limits)).min_by(|a, b| by_rank(*a, *b))?;
     all.retain(|found| {
-        let (own, more, _) = rank(found, limits);
-        (own, more) == (left_out, takes_more)
+        let (out, more, _) = rank(found, limits);
+        (out, more) == (fewest_out, takes_more)
     });
     let explained = |(fit, undone): &(FrameFit, Undone)| match &undone.what {
         What::Kind(kind) => Some((fit.contradiction(limits), kind.clone())),
@@ -250,8 +275,11 @@ fn nearest(robot: &KnownRobot, undone: Vec<Undone>) -> Vec<Undone> {
 
 /// What leaves fewer touches out is better, then what takes no more unknowns, then what fits better.
 fn rank((fit, undone): &(FrameFit, Undone), limits: &Limits) -> (usize, bool, f64) {
-    let left_out = fit.judged.iter().filter(|j| j.left_out).count();
-    (left_out, !matches!(undone.what, What::Kind(_)), fit.contradiction(limits))
+    (left_out(fit), !matches!(undone.what, What::Kind(_)), fit.contradiction(limits))
+}
+
+fn left_out(fit: &FrameFit) -> usize {
+    fit.judged.iter().filter(|j| j.left_out).count()
 }
 
 fn by_rank(a: (usize, bool, f64), b: (usize, bool, f64)) -> Ordering {

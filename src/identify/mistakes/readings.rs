@@ -84,7 +84,7 @@ pub(in crate::identify) fn mirrored_signs_undone(robot: &Robot, given: &[Vec<f64
 }
 
 /// The joints whose signs, beside those of a mirror image (readings by their indices), are those that these joints have wrong.
-pub(super) fn signs_of_others(robot: &Robot, joints: &[String], mirror: &[usize]) -> Vec<String> {
+pub(in crate::identify) fn signs_of_others(robot: &Robot, joints: &[String], mirror: &[usize]) -> Vec<String> {
     let names = robot.chain.readings.iter().enumerate();
     names.filter(|(k, name)| mirror.contains(k) != joints.contains(name)).map(|(_, name)| name.clone()).collect()
 }

@@ -99,6 +99,16 @@ pub fn frame_findings(
     all
 }
 
+/// Touches fit as well with the signs of these joints changed.
+pub fn mirror_image_fits(joints: &[String], subject: &str) -> FileFinding {
+    let text = format!(
+        "the touches fit as well with the readings of {} negated, as those of the mirror image of the arm: were these of the wrong sign, the tool would lie mirrored; see that these joints count as in the series of the solution, or touch four known places that lie not in one plane",
+        joints.join(", ")
+    );
+    let (code, quantities) = (Code::MirrorImageFits, numbers([("joints", joints.len() as f64)]));
+    FileFinding { code, weight: Weight::Note, subject: subject.to_owned(), quantities, text }
+}
+
 /// Places of which every touch, of two and more, is left out: these agree with each other, so that the place is rather wrong than each of them.
 fn places_left_out(fit: &FrameFit, touches: &Touches, subject: &str) -> Vec<FileFinding> {
     let mut places: Vec<(Vector3<f64>, Vec<usize>)> = Vec::new();
