@@ -31,7 +31,8 @@ pub fn detect_stops(series: &Series, limits: &Limits, progress: impl Fn(&Path) +
     let mut found = detect_series(&paths, &series.plate, &picture, progress).into_iter();
     let missing = |image: &str| {
         let table = series.readings_file();
-        let remedy = format!("copy it into images/, or remove its row from {}", table.display());
+        let remedy =
+            format!("copy it into images/, or remove its row from {}", table.file_name().unwrap_or_default().display());
         SeriesImage::failed(Error::new(Code::ImageNotThere, image, "the image file is missing", remedy))
     };
     let seen = series.stops.stops.iter().map(|stop| {
