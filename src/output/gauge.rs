@@ -14,13 +14,15 @@ use crate::solve::{InFrame, PlateScale, Similarity, in_frame};
 /// Plates, their poses and covariances in the frames of their nominal markers.
 pub(super) struct Gauge {
     in_frame: InFrame,
-    /// Shapes of the plates, as large as they were found; that of a plate that no image shows as it was.
+    /// Shapes of the plates at their sizes; that of a plate that no image shows as it was.
     pub plates: Vec<PlateShape>,
     /// Poses of the plates: `base_from_plate`, or `flange_from_plate` for a fixed camera.
     pub placements: Vec<Pose>,
     /// `fitted plate frame <- frame` of every plate and of every placement.
     of_plates: Vec<Pose>,
     of_placements: Vec<Pose>,
+    /// Size of every plate here over that in the fit.
+    resized: Vec<f64>,
     /// Covariance of the position of every marker, its plate's scale apart, m^2.
     pub positions: Vec<Vec<Matrix3<f64>>>,
     /// Scale of every plate as in its files; none for a plate that no image shows.
@@ -28,20 +30,35 @@ pub(super) struct Gauge {
 }
 
 impl Gauge {
-    /// Of a fit.
+    /// Of a fit with a robot: plates as large as they were found.
     ///
     /// # Errors
     /// Markers that lie on a line.
     pub fn of(fit: &Fit) -> Result<Self> {
+        Self::with_sizes(fit, |_, found| found)
+    }
+
+    /// Of images alone, which see no size: plates as large as the stand-alone poses are given for.
+    ///
+    /// # Errors
+    /// Markers that lie on a line.
+    pub fn of_images(fit: &Fit, scales: &[Option<PlateScale>]) -> Result<Self> {
+        let size = |plate: usize, found| scales[plate].map_or(found, |scale| 1.0 + scale.relative);
+        Ok(Self { scales: scales.to_vec(), ..Self::with_sizes(fit, size)? })
+    }
+
+    /// `size` is that of a plate, of which the fit found one.
+    fn with_sizes(fit: &Fit, size: impl Fn(usize, f64) -> f64) -> Result<Self> {
         let Adjustment { problem, state } = &fit.adjustment;
         let in_frame = in_frame(fit.linear(), &fit.covariance)?;
         let mut plates = state.plates.clone();
         let mut of_plates = vec![Pose::identity(); plates.len()];
-        let mut scales = vec![None; plates.len()];
+        let (mut scales, mut resized) = (vec![None; plates.len()], vec![1.0; plates.len()]);
         for frame in &in_frame.frames {
             let similarity = Similarity::of(frame, &fit.adjustment)?;
             for &plate in &frame.plates {
-                let size = similarity.size(plate);
+                let size = size(plate, similarity.size(plate));
+                resized[plate] = size / similarity.size(plate);
                 plates[plate] = similarity.shape(plate, &state.plates[plate], size);
                 of_plates[plate] = similarity.motion;
                 let sigma = in_frame.scale_sigma(problem, plate);
@@ -56,7 +73,7 @@ impl Gauge {
             let turn = motion.rotation.transpose();
             own.iter_mut().for_each(|c| *c = turn * *c * turn.transpose());
         }
-        Ok(Self { in_frame, plates, placements, of_plates, of_placements, positions, scales })
+        Ok(Self { in_frame, plates, placements, of_plates, of_placements, resized, positions, scales })
     }
 
     /// Covariance of the pose of a plate.
@@ -71,7 +88,11 @@ impl Gauge {
     pub fn camera_from_plate(&self, Adjustment { problem, state }: &Adjustment, image: usize, fitted: &Pose) -> Pose {
         let own = &problem.images[image];
         let is_free = own.rejected.is_none() && state.ties[image].is_free();
-        *fitted * if is_free { self.of_plates[own.plate] } else { self.of_placements[own.placement] }
+        if !is_free {
+            return *fitted * self.of_placements[own.placement];
+        }
+        let followed = *fitted * self.of_plates[own.plate];
+        Pose::new(followed.rotation, followed.translation * self.resized[own.plate])
     }
 }
 

@@ -159,5 +159,11 @@ fn files_of_poses_with_a_bowed_plate_project_where_it_was_seen() {
     let off = off_by_poses_px(&made, &files, 1.0);
     println!("off by poses.csv {off} px");
     assert!(off < 1.5 * NOISE_PX);
-    assert!(mean_height(&positions(&files)).abs() < 1e-9);
+    let markers = positions(&files);
+    assert!(mean_height(&markers).abs() < 1e-9);
+    // The size of the plate is that of the poses, nominal.
+    let pairs = || made.plate.markers.iter().map(|m| m.position_m).zip(&markers);
+    let grown =
+        pairs().map(|(n, x)| n.dot(&(x - n))).sum::<f64>() / pairs().map(|(n, _)| n.norm_squared()).sum::<f64>();
+    assert!(grown.abs() < 1e-9, "{grown:e}");
 }

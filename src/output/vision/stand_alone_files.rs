@@ -133,7 +133,7 @@ struct ImageOf<'a> {
 pub fn stand_alone_files(found: &StandAlone, context: &StandAloneContext) -> Result<BTreeMap<String, Vec<u8>>> {
     let Adjustment { problem, state } = &found.fit.adjustment;
     let (series, depths) = (&context.series, depths_m(problem, &found.free_poses));
-    let (names, gauge) = (ImageNames::new(problem, series), Gauge::of(&found.fit)?);
+    let (names, gauge) = (ImageNames::new(problem, series), Gauge::of_images(&found.fit, &found.free_poses.scales)?);
     let cameras = camera_file::cameras(&problem.cameras, &state.cameras, &depths);
     let plates = plate_files::plates(problem, series, &gauge)?;
     let poses = [("poses.csv".to_owned(), pose_files::poses_csv(&names, &found.free_poses))];
