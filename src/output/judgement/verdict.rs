@@ -106,6 +106,7 @@ fn is_information(code: Code) -> bool {
             | Code::LensChosen
             | Code::ModelNotCompared
             | Code::ObservationsMissing
+            | Code::PlatesAlike
             | Code::RepeatabilityUnused
             | Code::SecondArmRenamed
             | Code::TipChosen
