@@ -271,7 +271,9 @@ mod tests {
     fn every_check_is_named_after_its_file() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/diagnose");
         for check in CHECKS {
-            assert!(folder.join(format!("{}.rs", check.name)).is_file(), "{}", check.name);
+            let file = format!("{}.rs", check.name);
+            let is_there = ["", "steps", "left_out"].iter().any(|part| folder.join(part).join(&file).is_file());
+            assert!(is_there, "{}", check.name);
         }
         let names: BTreeSet<&str> = CHECKS.iter().map(|check| check.name).collect();
         assert_eq!(names.len(), CHECKS.len());
