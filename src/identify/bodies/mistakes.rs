@@ -44,6 +44,7 @@ pub(super) fn name_mistake(
     {
         return Ok(());
     }
+    let stops: Vec<usize> = given.iter().map(|s| s.stop).collect::<BTreeSet<usize>>().into_iter().collect();
     if !is_suspicious {
         given = some_of(given.len()).map(|k| given[k].at(given[k].readings.clone())).collect();
     }
@@ -58,7 +59,7 @@ pub(super) fn name_mistake(
         let undone = given.iter().zip(readings).map(|(s, readings)| s.at(readings));
         (undone.collect(), kind)
     });
-    let undone = read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, &given));
+    let undone = read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, (&given, stops)));
     // In sockets an arm that hardly moves fits without a cause.
     let is_tried = |(_, kind): &Undone| {
         let hardly_moves = matches!(kind, MistakeKind::Unit { joint: None, are_degrees: true });
@@ -88,10 +89,10 @@ fn is_contradicted(problem: &Problem, measured: &[usize], misfit: f64, limits: &
     measured.len() >= 2 * FEWEST_POINTS && misfit > limits.touch_factor * sigma
 }
 
-/// Readings of the next stop, or the one before, in its series: of those in joints.csv, and of those that were measured. A stop at the end has none.
-fn rows_undone(problem: &Problem, robot: &Robot, given: &[SeenAt]) -> Vec<Undone> {
+/// What was seen, with the readings of the next stop, or the one before, in its series: of those in joints.csv, and of `measured`, all at which
+/// something was measured. A stop at the end has none.
+fn rows_undone(problem: &Problem, robot: &Robot, (given, measured): (&[SeenAt], Vec<usize>)) -> Vec<Undone> {
     let all: Vec<usize> = (0..problem.stops.len()).collect();
-    let measured: Vec<usize> = given.iter().map(|s| s.stop).collect::<BTreeSet<usize>>().into_iter().collect();
     let orders = if measured.len() < all.len() { vec![all, measured] } else { vec![all] };
     // Few rows fit others by chance.
     let are_points = given.iter().any(|s| matches!(s.seen, BodySeen::Point(_)));
