@@ -11,7 +11,7 @@ use crate::problem::{Adjustment, BodyRejection, BodySeen, InstrumentKind, Proble
 
 /// Leaves out what was written again at successive stops of a series, where the others say that the target was carried further than they miss by, and
 /// is elsewhere.
-pub(super) fn leave_out_repeated(adjustment: &mut Adjustment, limits: &Limits) {
+pub(super) fn leave_out_stuck(adjustment: &mut Adjustment, limits: &Limits) {
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (k, measured) in adjustment.problem.used_bodies() {
         if adjustment.problem.instruments[measured.instrument].kind == InstrumentKind::Tracker {

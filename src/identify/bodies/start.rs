@@ -12,7 +12,7 @@ use super::mistakes::name_mistake;
 use super::placed::{SeenFrom, missed, pairs, placed};
 use super::places_exchanged::name_exchange;
 use super::points_start::{DISAGREES, FEWEST_POINTS, HOLD, Placed, TRIMMINGS, once, posture, tip_at};
-use super::repeated_rows::leave_out_repeated;
+use super::repeated_rows::leave_out_stuck;
 use super::rows_in_part::name_part;
 use super::unrelated_rows::name_unrelated;
 use crate::assess::Limits;
@@ -30,7 +30,7 @@ pub(in crate::identify) fn start_bodies(
     series: &[MeasuredSeries],
     limits: &Limits,
 ) -> Result<()> {
-    leave_out_repeated(adjustment, limits);
+    leave_out_stuck(adjustment, limits);
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (k, measured) in adjustment.problem.used_bodies() {
         groups.entry((measured.instrument, measured.body)).or_default().push(k);
