@@ -31,11 +31,11 @@ impl GivenCamera {
         match self {
             Self::Not => None,
             Self::Start => Some(
-                "the lens is that of --camera-file: correct the file, or leave --camera-file out, for the data to choose",
+                "the lens is that of --camera-file: correct the file, or leave --camera-file out, for the data to choose (with --from, where the solution has it from there, --camera auto sets it aside)",
             ),
             Self::Held => Some(
                 "the camera of --camera-file is held, and is the likely cause: correct the file (lens, pixel of the origin, focus, resolution), or \
-                 leave --hold-camera out",
+                 leave --hold-camera out (with --from, where the solution holds it, --camera auto or --camera LENS sets it aside)",
             ),
         }
     }

@@ -52,7 +52,7 @@ impl Kind for LensNotInRos {
 
     fn remedy(&self) -> String {
         match self.loss_px {
-            _ if self.given != GivenCamera::Not => "the lens is that of --camera-file; solution.json has it itself, and robotcal convert writes it in a format that holds it".into(),
+            _ if self.given != GivenCamera::Not => "the lens is that of --camera-file (with --from, --camera ros sets it aside); solution.json has it itself, and robotcal convert writes it in a format that holds it".into(),
             Some(_) => "solution.json has the lens itself; --camera ros identifies one that camera.yaml can express".into(),
             None => "solution.json has the lens itself, and robotcal convert writes it in a format that holds it; --camera ros identifies one that camera.yaml can express".into(),
         }
