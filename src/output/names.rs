@@ -30,12 +30,17 @@ pub(super) fn series_name(all: &[String], series: usize) -> String {
     all.get(series).cloned().unwrap_or_else(|| format!("series {}", series + 1))
 }
 
-/// Name of a plate: as stated, else that of the first series that shows it.
+/// Name of a plate: as stated, with that of the first series that shows it where another plate is called the same; else that of the series.
 pub(super) fn plate_name(problem: &Problem, series: &[String], plate: usize) -> String {
-    let stated = problem.plates.get(plate).and_then(|p| p.name.clone());
+    let stated = problem.plates.get(plate).and_then(|p| p.name.as_ref());
+    let is_of_others = |name: &String| problem.plates.iter().filter(|p| p.name.as_ref() == Some(name)).count() > 1;
     let first = problem.images.iter().find(|i| i.plate == plate);
     let of_series = || first.map_or_else(|| format!("plate {}", plate + 1), |i| series_name(series, i.series));
-    stated.unwrap_or_else(of_series)
+    match stated {
+        Some(name) if is_of_others(name) => format!("{name} ({})", of_series()),
+        Some(name) => name.clone(),
+        None => of_series(),
+    }
 }
 
 /// Names of all columns; those of several plates by series instead of by path.

@@ -174,7 +174,7 @@ pub struct CameraRecord {
 /// A plate: as given, and corrected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlateRecord {
-    /// Name: that of the first series that shows it.
+    /// Name: as stated in plate.toml where no other plate has it, else with that of the first series that shows it.
     pub name: String,
     /// What its plate.toml calls it, where it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
