@@ -109,7 +109,7 @@ fn is_socket(problem: &Problem, instrument: usize) -> bool {
 /// How the stops are divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// By rows: changed once.
+    /// By rows, or as they are given: changed once.
     Time,
     /// By how far this axis of what the robot carries points up: held by its weight only.
     Up(usize),
@@ -117,8 +117,6 @@ pub enum Order {
     Drift,
     /// Not at all: another than in the other series.
     Whole,
-    /// By what was found of each: two places by turns.
-    Turns,
 }
 
 /// Something that was measured at a stop.

@@ -28,7 +28,7 @@ impl Linear {
             let mut divide = |order, rows: Vec<usize>| {
                 let rows = Rc::new(rows);
                 let (from, fewest) = match order {
-                    Order::Whole | Order::Drift | Order::Turns => (0..1, 0),
+                    Order::Whole | Order::Drift => (0..1, 0),
                     Order::Time | Order::Up(_) => (fewest..(rows.len() + 1).saturating_sub(fewest), fewest),
                 };
                 let is_tried =
@@ -85,7 +85,7 @@ impl Linear {
             Order::Time => [Changed::Focal(camera), Changed::Centre(camera)].map(once).concat(),
             // What moved once by much may creep, too, as far as one step from the fit tells.
             Order::Drift => once(Changed::Centre(camera)),
-            Order::Up(_) | Order::Whole | Order::Turns => return None,
+            Order::Up(_) | Order::Whole => return None,
         };
         let mut step = self.most(problem, &tried)?;
         let by_chance = step.change.len() as f64;
@@ -106,7 +106,7 @@ impl Linear {
         let group = self.rows[*moved.first()?].group;
         let from = rows.len();
         rows.extend(moved);
-        Some(Candidate { changed, order: Order::Turns, group, rows: Rc::new(rows), from, fewest: 0 })
+        Some(Candidate { changed, order: Order::Time, group, rows: Rc::new(rows), from, fewest: 0 })
     }
 
     fn what_may_change(&self, problem: &Problem) -> Vec<Changed> {

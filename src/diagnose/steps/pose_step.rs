@@ -150,7 +150,6 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
         Order::Up(axis) => Displacement::AxisUp(axis),
         Order::Drift => Displacement::AllThrough,
         Order::Whole => Displacement::InAll,
-        Order::Turns => Displacement::ByTurns,
     };
     let images: Vec<String> = step.shown.iter().map(name).collect();
     let limits = setting.limits;
