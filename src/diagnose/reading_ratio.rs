@@ -3,8 +3,6 @@
 //! Joint noise takes up an error of a gear ratio, as it grows with the reading: where it is large, single readings are given a part of their own
 //! or of another reading ([`solve_slopes`]) by the stand-alone camera poses, those of images that were left out among them.
 
-use std::collections::BTreeMap;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
@@ -37,14 +35,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<R
     if !is_noisy || chain.base_moves() || chain.pose_coordinates().is_some() {
         return None;
     }
-    let mut groups: BTreeMap<[usize; 2], Vec<SeenStop>> = BTreeMap::new();
-    for (i, image) in problem.images.iter().enumerate() {
-        let (Some(stop), Some(pose)) = (problem.posture(i), &setting.free.poses[i]) else { continue };
-        let (readings, camera_from_plate) = (stop.readings.clone(), pose.camera_from_plate);
-        let seen = SeenStop { readings, mount: image.mount, camera_from_plate };
-        groups.entry([image.mounting, image.placement]).or_default().push(seen);
-    }
-    let largest = groups.into_values().max_by_key(Vec::len)?;
+    let largest = setting.free.most_seen_stops(problem, 0..problem.images.len());
     told(&Robot::nominal(chain.clone()), &largest, limits)
 }
 

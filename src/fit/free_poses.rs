@@ -1,9 +1,12 @@
 //! Stand-alone camera poses: what the free-pose adjustment found.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix6, SVector};
 
 use crate::geom::Pose;
-use crate::problem::{E, ImageTerms, State};
+use crate::init::SeenStop;
+use crate::problem::{E, ImageTerms, Problem, State};
 use crate::solve::PlateScale;
 
 /// Stand-alone pose of one image.
@@ -76,4 +79,30 @@ pub struct FreePoses {
     pub scales: Vec<Option<PlateScale>>,
     /// Pixel factors found.
     pub pixel_factor: Vec<f64>,
+}
+
+impl FreePoses {
+    /// Those of these images that were taken on the robot, with what they and their readings say, by index, for every camera mounting and plate
+    /// placement.
+    pub fn seen_stops(
+        &self,
+        problem: &Problem,
+        images: impl Iterator<Item = usize>,
+    ) -> BTreeMap<(usize, usize), Vec<(usize, SeenStop)>> {
+        let mut groups: BTreeMap<(usize, usize), Vec<(usize, SeenStop)>> = BTreeMap::new();
+        for i in images {
+            let image = &problem.images[i];
+            let (Some(stop), Some(pose)) = (problem.posture(i), &self.poses[i]) else { continue };
+            let (readings, camera_from_plate) = (stop.readings.clone(), pose.camera_from_plate);
+            let seen = SeenStop { readings, mount: image.mount, camera_from_plate };
+            groups.entry((image.mounting, image.placement)).or_default().push((i, seen));
+        }
+        groups
+    }
+
+    /// Those of the mounting and placement with most of them.
+    pub fn most_seen_stops(&self, problem: &Problem, images: impl Iterator<Item = usize>) -> Vec<SeenStop> {
+        let largest = self.seen_stops(problem, images).into_values().max_by_key(Vec::len).unwrap_or_default();
+        largest.into_iter().map(|(_, stop)| stop).collect()
+    }
 }

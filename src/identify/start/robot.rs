@@ -49,8 +49,11 @@ pub(in crate::identify) fn start_robot(
     let mut aside = Vec::new();
     let robot = &adjustment.state.robot;
     let pairs = |seen: Vec<(usize, SeenStop)>| seen.into_iter().map(|(i, stop)| (i, stop.pair(robot))).collect();
-    let mut order: Vec<(_, Vec<(usize, PosePair)>)> =
-        seen_stops(adjustment, free).into_iter().map(|(of, seen)| (of, pairs(seen))).collect();
+    let mut order: Vec<(_, Vec<(usize, PosePair)>)> = free
+        .seen_stops(&adjustment.problem, used(adjustment))
+        .into_iter()
+        .map(|(of, seen)| (of, pairs(seen)))
+        .collect();
     order.sort_by_key(|((m, p), pairs)| (std::cmp::Reverse(pairs.len()), *m, *p));
     let (keys, groups): (Vec<_>, Vec<_>) = order.into_iter().unzip();
     let given = StartGiven { groups: &groups, ..given };
@@ -90,29 +93,15 @@ pub(in crate::identify) fn start_robot(
     Ok(aside)
 }
 
-/// Images on the robot with what they and their readings say, by index, for every camera mounting and plate placement.
-fn seen_stops(adjustment: &Adjustment, free: &FreePoses) -> BTreeMap<(usize, usize), Vec<(usize, SeenStop)>> {
-    let mut groups: BTreeMap<(usize, usize), Vec<(usize, SeenStop)>> = BTreeMap::new();
-    for (i, image, _) in adjustment.used() {
-        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
-        let (readings, camera_from_plate) = (stop.readings.clone(), pose.camera_from_plate);
-        let seen = SeenStop { readings, mount: image.mount, camera_from_plate };
-        groups.entry((image.mounting, image.placement)).or_default().push((i, seen));
-    }
-    groups
-}
-
-/// Those of the mounting and placement with most of them.
-fn most_seen_stops(adjustment: &Adjustment, free: &FreePoses) -> Vec<SeenStop> {
-    let largest = seen_stops(adjustment, free).into_values().max_by_key(Vec::len).unwrap_or_default();
-    largest.into_iter().map(|(_, stop)| stop).collect()
+fn used(adjustment: &Adjustment) -> impl Iterator<Item = usize> {
+    adjustment.problem.used().map(|(i, _)| i)
 }
 
 /// Gives the joint between the bases of two arms an origin, where it has none yet.
 fn place_bases(adjustment: &mut Adjustment, free: &FreePoses) -> Result<()> {
     let robot = &adjustment.state.robot;
     let Some(joint) = bases::unplaced(robot) else { return Ok(()) };
-    let stops = most_seen_stops(adjustment, free);
+    let stops = free.most_seen_stops(&adjustment.problem, used(adjustment));
     if stops.is_empty() {
         return Ok(());
     }
@@ -133,7 +122,7 @@ fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
     if is_found || robot.chain.base_moves() || robot.chain.pose_coordinates().is_some() {
         return;
     }
-    let stops = most_seen_stops(adjustment, free);
+    let stops = free.most_seen_stops(&adjustment.problem, used(adjustment));
     if stops.len() < limits.zeros_images {
         return;
     }
