@@ -48,6 +48,7 @@ pub use observations::detections::{
     SeenSeries, Unused, detect_images, detect_stops, flat_field_drift, pictures, require_some,
 };
 pub use observations::measure::{MeasuredWithNotices, image_size, measure, measure_bodies};
+pub use observations::repeated::leave_out_repeated_bodies;
 pub use observations::seen_image::SeenImage;
 pub use observations::stated::CameraStart;
 pub use observations::together::bring_together;

@@ -331,6 +331,23 @@ fn places_of_a_plane_that_were_touched_from_below_are_told() {
     }
 }
 
+/// Touches that are given again would make tool and work object look `sqrt(2)` times as well known as they are.
+#[test]
+fn touches_count_once_however_often_they_are_given() {
+    let Files { folder, touches, .. } = files("fixture", work(), 8);
+    let (solution, frames) = (repo(SOLUTION), folder.path().join("frames"));
+    let copy = folder.path().join("copy");
+    std::fs::create_dir(&copy).unwrap();
+    for entry in std::fs::read_dir(&touches).unwrap() {
+        let file = entry.unwrap().path();
+        std::fs::copy(&file, copy.join(file.file_name().unwrap())).unwrap();
+    }
+    let [from, touches, copy] = [&solution, &touches, &copy].map(|p| p.to_str().unwrap());
+    let run = robotcal(&["frames", "--from", from, "--touches", touches, copy], &frames).expect(2);
+    assert!(run.said().contains(&Code::SeriesRepeated.to_string()));
+    assert!(!frames.join(frames_record::FILE_NAME).exists());
+}
+
 /// Each bad input is refused with its file and place.
 #[test]
 fn bad_touches_are_refused_by_file_and_place() {

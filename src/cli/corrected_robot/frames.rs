@@ -17,7 +17,7 @@ use crate::diagnose::{Mistake, Weight};
 use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, Seen, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
-use crate::identify::{measure_bodies, mirror_image, touch_mistake};
+use crate::identify::{leave_out_repeated_bodies, measure_bodies, mirror_image, touch_mistake};
 use crate::output::corrections::{FileFinding, numbers};
 use crate::output::frame_files::{self, Frames, Named};
 use crate::output::frame_findings::{at_the_places, frame_findings, mirror_image_fits};
@@ -273,6 +273,7 @@ fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotD
         as_planned.extend(touch_plan::as_planned(folder, &chain, touched(&measured.series))?);
         all.push(measured.series);
     }
+    notices.extend(leave_out_repeated_bodies(&mut all)?);
     Ok(Measured { touches: Touches::of(&all)?, files, notices, as_planned })
 }
 

@@ -8,7 +8,7 @@ mod bodies;
 pub(super) mod detections;
 pub(super) mod measure;
 mod plates;
-mod repeated;
+pub(super) mod repeated;
 mod second_pass;
 pub(super) mod seen_image;
 pub(super) mod stated;
