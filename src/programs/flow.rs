@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-pub(super) use super::held::Held;
+pub(super) use super::held::{Either, Held};
 use super::routines::Routines;
 use crate::error::Result;
 

@@ -71,6 +71,19 @@ fn what_a_handler_switches_holds_where_its_routine_goes_on() {
     assert_told(&cell, &turned, 0, &[posture]);
 }
 
+/// What may hold where a handler leaves a routine is none of what the routine has switched: its caller's handler does not begin with it.
+#[test]
+fn what_a_handler_ends_in_stays_with_the_call() {
+    let cell = Cell::kuka(334);
+    let elsewhere = format!("ENDPROC\nPROC Elsewhere()\n{SHIFT}");
+    let sub = "ENDPROC\nPROC Sub()\nPDispOff;\nSearchIt;\nERROR\nPDispOff;\nRETURN;";
+    let body = format!("Sub;\nPDispOff;\n{STEP}\nERROR\n{STEP}\nTRYNEXT;\n{sub}\n{elsewhere}");
+    assert_told(&cell, &body, 2, &[]);
+    // Where the routine does displace, it does.
+    let body = body.replacen("PROC Sub()\nPDispOff;", &format!("PROC Sub()\n{SHIFT}\nSearchIt;\nPDispOff;"), 1);
+    assert_told(&cell, &body, 1, &[LeftReason::FrameUnknown.name()]);
+}
+
 #[test]
 fn what_a_trap_routine_switches_may_hold_behind_every_statement() {
     let cell = Cell::kuka(332);

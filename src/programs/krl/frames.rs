@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::geom::Pose;
-use crate::programs::flow::{Followed, Held};
+use crate::programs::flow::{Either, Followed, Held};
 use crate::programs::program::StatedFrame;
 use crate::programs::scan::Reader;
 
@@ -121,6 +121,15 @@ impl FrameIs {
 
     fn may_move(&self) -> bool {
         matches!(self, Self::Unknown(Unknown { may_move: true, .. }))
+    }
+}
+
+/// Why a frame is not known.
+const MANY: &str = "one of very many that a routine sets";
+
+impl Either for FrameIs {
+    fn either(&self, other: &Self) -> Self {
+        self.either(other, MANY)
     }
 }
 

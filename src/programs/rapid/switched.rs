@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::programs::flow::{Followed, Held};
+use crate::programs::flow::{Either, Followed, Held};
 use crate::programs::scan::Reader;
 
 /// Instructions that move all robtargets behind them, until `PDispOff`.
@@ -19,28 +19,9 @@ pub(super) enum Watched {
     Unknown,
 }
 
-/// Values of which either may hold.
-pub(super) trait Either {
-    /// What is known where one or the other holds.
-    fn either(&self, other: &Self) -> Self;
-}
-
 impl Either for Watched {
     fn either(&self, other: &Self) -> Self {
         if self == other { *self } else { Self::Unknown }
-    }
-}
-
-impl Either for bool {
-    fn either(&self, other: &Self) -> Self {
-        *self || *other
-    }
-}
-
-/// Names, of which all may hold.
-impl Either for BTreeSet<String> {
-    fn either(&self, other: &Self) -> Self {
-        self | other
     }
 }
 
@@ -81,7 +62,7 @@ impl<V: Either + Clone + PartialEq> Switch<V> {
     /// The same where any statement of the routine may have been the last one: it began with `top`, which has noted all that it passed through.
     fn anywhere(mut self, top: &Self) -> Self {
         if let Some(passed) = top.passed() {
-            self.set(self.value().either(&passed).either(top.value()));
+            self.0.becomes(self.value().either(&passed).either(top.value()));
         }
         self
     }

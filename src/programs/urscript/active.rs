@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::geom::Pose;
-use crate::programs::flow::{Followed, Held};
+use crate::programs::flow::{Either, Followed, Held};
 use crate::programs::program::{StatedFrame, Understood};
 use crate::programs::reason::{LeftReason, Why};
 
@@ -23,18 +23,19 @@ const SWITCHES: [(&[u8], usize, bool); 5] = [
 /// Why something is not known.
 const BESIDE: &str = "one that runs beside it may set it at any time";
 
+const MANY: &str = "very many set it";
+
 /// Threads that run on one way or another.
-fn running_either(
-    one: &BTreeMap<String, Option<String>>,
-    other: &BTreeMap<String, Option<String>>,
-) -> BTreeMap<String, Option<String>> {
-    let mut all = one.clone();
-    for (name, held) in other {
-        all.entry(name.clone())
-            .and_modify(|own| *own = own.take().filter(|own| Some(own) == held.as_ref()))
-            .or_insert_with(|| held.clone());
+impl Either for BTreeMap<String, Option<String>> {
+    fn either(&self, other: &Self) -> Self {
+        let mut all = self.clone();
+        for (name, held) in other {
+            all.entry(name.clone())
+                .and_modify(|own| *own = own.take().filter(|own| Some(own) == held.as_ref()))
+                .or_insert_with(|| held.clone());
+        }
+        all
     }
-    all
 }
 
 /// The tool, and why it is not known.
@@ -76,6 +77,12 @@ impl ToolIs {
             Self::Unset | Self::Computed => StatedFrame::Unsaid,
             Self::Several(_) => StatedFrame::Several,
         }
+    }
+}
+
+impl Either for ToolIs {
+    fn either(&self, _: &Self) -> Self {
+        Self::one_of_two(MANY)
     }
 }
 
@@ -126,7 +133,7 @@ impl Followed for Active {
         Self {
             tool: self.tool.merged(&other.tool, |_, _| ToolIs::one_of_two(why)),
             on_top,
-            beside: self.beside.merged(&other.beside, running_either),
+            beside: self.beside.merged(&other.beside, Either::either),
         }
     }
 
