@@ -178,12 +178,7 @@ fn with_stops(series: Series, pictures: &Pictures, args: &DoctorArgs, options: &
             options.clone().of_chain(&inputs.chain)
         }
     };
-    let read = pictures.of_recordings(vec![series.clone()], &options);
-    let of_joints = |e: &Error| e.code == Code::TopicAmbiguous && args.urdf.is_none() && e.remedy.contains("--joint");
-    let mut all = read.map_err(|e| match of_joints(&e) {
-        true => Error { remedy: format!("{}, or give --urdf: the joints of the robot choose", e.remedy), ..e },
-        false => e,
-    })?;
+    let mut all = pictures.of_recordings(vec![series.clone()], &options)?;
     Ok(all.pop().unwrap_or(series))
 }
 

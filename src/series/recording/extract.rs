@@ -8,7 +8,7 @@ use super::file::for_each;
 use super::messages::CameraInfo;
 use super::motion::{Posture, Standstill, interpolate, postures, standstills};
 use super::options::{Clock, Motion, RecordingOptions};
-use super::scan::{JointReadings, Scan, scan};
+use super::scan::{JointReadings, Scan, or_urdf, scan};
 use super::silence::{self, Gaps};
 use super::two_publishers;
 use super::unit;
@@ -73,7 +73,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     }
     let still_speeds: Vec<f64> = factors.iter().map(|factor| options.still_speed / factor).collect();
     let joints_place = format!("{}, topic {}", recording.display(), topics.join(", "));
-    two_publishers::require_one(&joints_place, &samples, &joints, &still_speeds)?;
+    two_publishers::require_one(&joints_place, &samples, &joints, &still_speeds, or_urdf(options))?;
     require_overlap(&scan, &postures, &times)?;
     let image_delay_s = scan.delay_s(std::slice::from_ref(&image_topic)) - scan.delay_s(&topics);
     let guess = match options.clock {
@@ -299,7 +299,7 @@ fn groups(
         }
         groups.sort();
     } else if !groups.is_empty() && standing.is_missed(used, times.len()) {
-        return Err(missed(&place, used, times.len()));
+        return Err(missed(&place, used, times.len(), options));
     } else if used < times.len() && !groups.is_empty() {
         let what = format!(
             "{} of {} images were taken outside the standstills and are not used",
@@ -365,12 +365,18 @@ impl Standing {
 const CHANCE: usize = 4;
 
 /// Images were taken at the stops and bear other times.
-fn missed(place: &str, used: usize, images: usize) -> Error {
+fn missed(place: &str, used: usize, images: usize, options: &RecordingOptions) -> Error {
     let what = format!(
         "{} of {images} images were taken outside the standstills, more than by chance: their times are not those of the joint states",
         images - used
     );
-    let remedy = "state how late the images are (--image-delay SECONDS), or take the times of recording (--clock log)";
+    let other_clock = (options.clock != Clock::Log).then_some("take the times of recording (--clock log)");
+    let delay = options.image_delay_s.is_none().then_some("state how late the images are (--image-delay SECONDS)");
+    let ways: Vec<&str> = [delay, other_clock].into_iter().flatten().collect();
+    let ways = if ways.is_empty() { "correct --image-delay".to_owned() } else { ways.join(", or ") };
+    let remedy = format!(
+        "{ways}; where they were taken in motion on purpose: --in-motion SECONDS takes images while the robot moves, too, so far apart"
+    );
     Error::new(Code::ImagesInMotion, place, what, remedy)
 }
 

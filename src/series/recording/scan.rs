@@ -75,6 +75,11 @@ const JOINTS: Wanted = Wanted { what: "joint states", flag: "--joint-topic", typ
 const IMAGES: Wanted =
     Wanted { what: "images", flag: "--image-topic", types: &["Image", "RawImage", "CompressedImage"] };
 
+/// The joints of the robot choose, where none are asked for yet.
+pub(super) fn or_urdf(options: &RecordingOptions) -> &'static str {
+    if options.joints.is_empty() { ", or give --urdf: the joints of the robot choose" } else { "" }
+}
+
 /// Everything of the first pass.
 #[derive(Debug, Default)]
 pub(super) struct Scan {
@@ -125,11 +130,19 @@ pub(super) fn time_ns(stamp_ns: i64, message: &Message<'_>, clock: Clock) -> i64
     }
 }
 
-/// The names of the last sample where they are the same; memory that others need is added to `held`.
-fn shared(last: Option<&Rc<Vec<String>>>, names: Vec<String>, held: &mut usize) -> Rc<Vec<String>> {
-    match last {
-        Some(last) if **last == names => Rc::clone(last),
-        _ => {
+/// Publishers of one topic that may take turns.
+const MOST_IN_TURN: usize = 8;
+
+/// The names of one of the last samples where they are the same; memory that others need is added to `held`.
+fn shared(
+    samples: &[JointSample],
+    of: impl Fn(&JointSample) -> &Rc<Vec<String>>,
+    names: Vec<String>,
+    held: &mut usize,
+) -> Rc<Vec<String>> {
+    match samples.iter().rev().take(MOST_IN_TURN).map(of).find(|last| ***last == names) {
+        Some(last) => Rc::clone(last),
+        None => {
             *held += names.iter().map(|n| n.len() + size_of::<String>()).sum::<usize>();
             Rc::new(names)
         }
@@ -166,9 +179,9 @@ impl Scan {
                     return if unread.is_empty() { Ok(()) } else { self.unread(message.topic, time_ns, unread) };
                 }
                 let samples = self.joints.entry(message.topic.to_string()).or_default();
-                let names = shared(samples.last().map(|last| &last.names), state.names, &mut self.held);
-                let marks = shared(samples.last().map(|last| &last.marks), state.marks, &mut self.held);
-                let unread = shared(samples.last().map(|last| &last.unread), unread, &mut self.held);
+                let names = shared(samples, |last| &last.names, state.names, &mut self.held);
+                let marks = shared(samples, |last| &last.marks, state.marks, &mut self.held);
+                let unread = shared(samples, |last| &last.unread, unread, &mut self.held);
                 self.held += size_of::<JointSample>() + size_of_val(&state.positions[..]);
                 if self.held > MOST_HELD {
                     return Ok(());
@@ -190,7 +203,7 @@ impl Scan {
     /// Notes that a topic whose joints were read before was written without one of them.
     fn unread(&mut self, topic: &str, time_ns: i64, joints: Vec<String>) -> Decoded<()> {
         if let Some(samples) = self.joints.get_mut(topic) {
-            let unread = shared(samples.last().map(|last| &last.unread), joints, &mut self.held);
+            let unread = shared(samples, |last| &last.unread, joints, &mut self.held);
             self.held += size_of::<JointSample>();
             if self.held <= MOST_HELD {
                 let (names, positions, marks) = (Rc::default(), Vec::new(), Rc::default());
@@ -359,7 +372,11 @@ impl Scan {
                 return Ok(candidates.into_iter().map(str::to_owned).collect());
             }
         }
-        Ok(vec![self.choose(asked, &candidates, &JOINTS)?.to_owned()])
+        let chosen = self.choose(asked, &candidates, &JOINTS).map_err(|e| match e.code {
+            Code::TopicAmbiguous => Error { remedy: format!("{}{}", e.remedy, or_urdf(options)), ..e },
+            _ => e,
+        })?;
+        Ok(vec![chosen.to_owned()])
     }
 
     /// The joint states, with the joints to read (all that there are when none are asked for).

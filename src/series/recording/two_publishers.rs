@@ -12,8 +12,14 @@ const LONGEST_NS: i64 = 250_000_000;
 const BACK: f64 = 0.1;
 /// What goes to and fro by less than this share of all that the joint moves is noise, whatever the unit.
 const LEAST_OF_RANGE: f64 = 5e-4;
-/// Or by less than so many of the smallest steps of its readings.
+/// Or by less than so many of the smallest steps of its readings, but no more than so many times what a joint that stands may move.
 const LEAST_STEPS: f64 = 5.0;
+const MOST_STILL: f64 = 10.0;
+/// Two that differ while the joint moves alone are one and its echo; so many times at least they differ while it stands.
+const LEAST_STANDING: usize = 3;
+/// A joint stands where it is for so long before and behind, ns, and for so many readings.
+const STANDS_NS: u64 = 2 * WINDOW_NS as u64;
+const STANDS_READINGS: usize = 2 * (MOST_AWAY + 1);
 /// Fewer times, or more seldom than every so many ns: readings that failed.
 const LEAST: usize = 10;
 const SELDOM_NS: i64 = 10_000_000_000;
@@ -33,23 +39,33 @@ struct Reading<'a> {
 type Pair<'a> = [Reading<'a>; 2];
 
 /// Refuses joint states of two publishers: nobody knows which of them the robot follows. `still_speeds`: of each joint, in the units of its
-/// readings.
+/// readings; `or`: another way out, in words.
 ///
 /// # Errors
 /// As the name says, with what each of them shows.
-pub(super) fn require_one(place: &str, samples: &[JointSample], joints: &[String], still_speeds: &[f64]) -> Result<()> {
+pub(super) fn require_one(
+    place: &str,
+    samples: &[JointSample],
+    joints: &[String],
+    still_speeds: &[f64],
+    or: &str,
+) -> Result<()> {
     let mut most: Option<(&String, Vec<Pair>)> = None;
     for (joint, still_speed) in joints.iter().zip(still_speeds) {
         let readings = readings(samples, joint);
-        let pairs = to_and_fro(&readings, still_speed * 2e-9 * WINDOW_NS as f64);
-        if is_often(&readings, pairs.len()) && most.as_ref().is_none_or(|(_, others)| pairs.len() > others.len()) {
+        let Found { pairs, standing } = to_and_fro(&readings, still_speed * 2e-9 * WINDOW_NS as f64);
+        let (is_often, pairs) = (is_often(&readings, pairs.len()), standing);
+        if is_often
+            && pairs.len() >= LEAST_STANDING
+            && most.as_ref().is_none_or(|(_, others)| pairs.len() > others.len())
+        {
             most = Some((joint, pairs));
         }
     }
     let Some((joint, pairs)) = most else { return Ok(()) };
     let begin_ns = samples.iter().map(|s| s.time_ns).min().unwrap_or_default();
     let remedy = "record one publisher: stop the other (ros2 topic info -v names both), or give it a topic of its own and choose with --joint-topic";
-    Err(Error::new(Code::JointStatesOfTwo, place, described(joint, &pairs, begin_ns), remedy))
+    Err(Error::new(Code::JointStatesOfTwo, place, described(joint, &pairs, begin_ns), format!("{remedy}{or}")))
 }
 
 /// The readings of a joint in the order of time.
@@ -69,26 +85,52 @@ fn is_often(readings: &[Reading], count: usize) -> bool {
     count >= LEAST && (count as f64) * SELDOM_NS as f64 >= lasted_ns as f64
 }
 
-/// Readings that are left by `least` or more and come back at once.
-fn to_and_fro<'a>(readings: &[Reading<'a>], least: f64) -> Vec<Pair<'a>> {
+/// Readings that are left and come back at once: all, and those among them where the joint stands.
+#[derive(Debug, Default)]
+struct Found<'a> {
+    pairs: Vec<Pair<'a>>,
+    standing: Vec<Pair<'a>>,
+}
+
+/// Readings that are left by more than one that stands may move (`still`), and come back at once.
+fn to_and_fro<'a>(readings: &[Reading<'a>], still: f64) -> Found<'a> {
     let steps = readings.windows(2).map(|w| (w[1].position - w[0].position).abs());
     let smallest = steps.filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min);
     let (low, high) = range(readings.iter());
-    let least =
-        least.max(LEAST_OF_RANGE * (high - low)).max(if smallest.is_finite() { LEAST_STEPS * smallest } else { 0.0 });
-    let mut pairs = Vec::new();
+    let least = still.max(LEAST_OF_RANGE * (high - low)).max((LEAST_STEPS * smallest).min(MOST_STILL * still));
+    let mut found = Found::default();
     let mut from = 0;
     while from < readings.len() {
         match (2..=MOST_AWAY + 1).find(|steps| is_back(readings, from, *steps, least)) {
             Some(steps) => {
                 let pair = [readings[from], readings[from + 1]];
-                pairs.push(pairs.last().map_or(pair, |before| oriented(pair, before)));
+                let pair = found.pairs.last().map_or(pair, |before| oriented(pair, before));
+                found.pairs.push(pair);
+                if stands(readings, from, least) || stands(readings, from + 1, least) {
+                    found.standing.push(pair);
+                }
                 from += steps;
             }
             None => from += 1,
         }
     }
-    pairs
+    found
+}
+
+/// Whether a reading was there for a while before, and is for a while behind.
+fn stands(readings: &[Reading], at: usize, least: f64) -> bool {
+    let left = &readings[at];
+    let goes_on = |beside: &mut dyn Iterator<Item = &Reading>| {
+        let mut others = 0;
+        let near = |(k, reading): &(usize, &Reading)| {
+            *k < STANDS_READINGS || reading.time_ns.abs_diff(left.time_ns) <= STANDS_NS
+        };
+        beside.enumerate().take_while(near).all(|(_, reading)| {
+            others = if (reading.position - left.position).abs() < least { 0 } else { others + 1 };
+            others <= MOST_AWAY
+        })
+    };
+    goes_on(&mut readings[..at].iter().rev()) && goes_on(&mut readings[at + 1..].iter())
 }
 
 /// Whether a reading that was there before is left at once, and back after so many steps. A joint that turns back comes from further away.
@@ -128,7 +170,7 @@ fn described(joint: &str, pairs: &[Pair], begin_ns: i64) -> String {
     let shown = [0, 1].map(|k| format!("{} reads {:.4} to {:.4}", names[k], ranges[k].0, ranges[k].1));
     let [left, away] = pairs[0];
     format!(
-        "holds joint states of two publishers: {joint} goes to and fro {} times, at first {:.2} s after the first joint state between {:.4} and \
+        "holds joint states of two publishers: {joint} goes to and fro {} times where it stands, at first {:.2} s after the first joint state between {:.4} and \
          {:.4}; {}, {}",
         pairs.len(),
         left.time_ns.saturating_sub(begin_ns) as f64 * 1e-9,
@@ -192,7 +234,7 @@ mod tests {
     }
 
     fn refused(samples: &[JointSample]) -> Option<Error> {
-        require_one("run.mcap", samples, &["a".to_owned()], &[5e-3]).err()
+        require_one("run.mcap", samples, &["a".to_owned()], &[5e-3], "").err()
     }
 
     #[test]
@@ -202,6 +244,31 @@ mod tests {
             assert_eq!(error.code, Code::JointStatesOfTwo, "{every_ms}");
             assert!(["gui", "arm"].iter().all(|frame| error.what.contains(frame)), "{error}");
             assert!(refused(&recorded(every_ms, |t| position(t) + 0.01)).is_some(), "{every_ms}");
+        }
+    }
+
+    /// A joint that never moves has no other step than that from the one to the other; what the other sends may move all the time.
+    #[test]
+    fn two_publishers_of_a_joint_that_stands_are_told_apart() {
+        let alternating = |other: &dyn Fn(i64) -> f64| {
+            (0..2000).map(|k| sample(k * 10 * MS, if k % 2 == 0 { 0.5 } else { other(k) }, "arm")).collect::<Vec<_>>()
+        };
+        let stands = alternating(&|_| 0.0);
+        let moves = alternating(&|k| 0.3 * (k as f64 * 0.01).sin());
+        for samples in [stands, moves] {
+            assert_eq!(refused(&samples).map(|error| error.code), Some(Code::JointStatesOfTwo));
+        }
+    }
+
+    /// A relay: both agree wherever the joint stands.
+    #[test]
+    fn one_that_sends_what_another_sent_before_is_an_echo() {
+        for (every_ms, late_ms) in [(4, 50), (10, 50), (20, 50), (4, 90)] {
+            let own = (0..20_000 / every_ms).map(|k| k * every_ms * MS).map(|t| sample(t, position(t), "arm"));
+            let late = |t: i64| position((t - late_ms * MS).max(0));
+            let others = (0..20_000 / every_ms).map(|k| (k * every_ms + every_ms / 2) * MS);
+            let all: Vec<JointSample> = own.chain(others.map(|t| sample(t, late(t), "relay"))).collect();
+            assert!(refused(&all).is_none(), "every {every_ms} ms, {late_ms} ms late");
         }
     }
 
@@ -217,6 +284,10 @@ mod tests {
         assert!(refused(&flickers(1e-4, 1.0)).is_none());
         assert!(refused(&flickers(0.01, 1f64.to_degrees())).is_none());
         assert!(refused(&flickers(-std::f64::consts::TAU, 1.0)).is_none());
+        // A coarse digit, beyond what a joint that stands may move and the share of its range.
+        let at = |k: i64| 2e-3 * ((position(k * 10 * MS) / 2e-3).round() + f64::from((k * 7919) % 5 == 0));
+        let coarse: Vec<JointSample> = (0..2000).map(|k| sample(k * 10 * MS, at(k), "arm")).collect();
+        assert!(refused(&coarse).is_none());
         let mut failed = own.clone();
         (0..9).for_each(|k| failed[100 + 200 * k].positions[0] = 57.0);
         assert!(refused(&failed).is_none());
