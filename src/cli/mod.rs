@@ -24,7 +24,7 @@ use tracing_subscriber::prelude::*;
 
 use crate::error::{Code, Error, Result};
 use corrected_robot::{compensate, frames, verify, verify_args};
-use flags::arguments::{command_line, command_text};
+use flags::arguments::command_text;
 use images::{detect, plate, poses};
 use results::{compare, identify, long_table, show, summary};
 use series::{convert, doctor, plan, simulate};

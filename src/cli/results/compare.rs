@@ -6,13 +6,13 @@ use clap::Args;
 
 use crate::calibration::{Ends, Inputs, Observed};
 use crate::cli::Verdict;
+use crate::cli::flags::arguments::command_of_report;
 use crate::cli::flags::choices::Model;
 use crate::cli::flags::recording::RecordingArgs;
 use crate::cli::flags::robot::read_chain;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::say::{say, say_line};
 use crate::error::{Code, Error, Result};
-use crate::files::word;
 use crate::identify::Options;
 use crate::output::ResultFolder;
 use crate::output::comparison::comparison_markdown;
@@ -88,8 +88,7 @@ fn series(args: &CompareArgs) -> Result<Verdict> {
     let text = comparison_markdown(&comparison);
     say!("{text}");
     if let Some(place) = place {
-        let series: Vec<String> = args.series.iter().map(|s| format!(" --series {}", word(s.display()))).collect();
-        let command = format!("robotcal compare --urdf {}{}", word(args.urdf.display()), series.concat());
+        let command = command_of_report();
         let report = format!("# Two-step calibration against the joint fit, on a series\n\n    {command}\n\n{text}");
         write(&place, [("comparison.md", report)])?;
     }
@@ -121,7 +120,7 @@ fn study(args: &CompareArgs) -> Result<Verdict> {
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-    let command = format!("robotcal compare --study --urdf {} --seeds {}", word(args.urdf.display()), args.seeds);
+    let command = command_of_report();
     study_verdict(&study).iter().for_each(|line| say_line!("{line}"));
     let files = [
         ("two-stage-vs-joint.md", study_markdown(&study, &command)),
@@ -150,11 +149,7 @@ fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-    let end = |flag: &str, link: Option<&str>| link.map(|l| format!(" {flag} {l}")).unwrap_or_default();
-    let ends = end("--base", args.base.as_deref()) + &end("--tip", args.tip.as_deref());
-    let command =
-        format!("robotcal compare --monte-carlo --urdf {}{ends} --seeds {}", word(args.urdf.display()), args.seeds);
-    let text = monte_carlo_markdown(&cells, &command);
+    let text = monte_carlo_markdown(&cells, &command_of_report());
     say!("{text}");
     write(&place, [("monte-carlo.md", text)])?;
     Ok(Verdict::Good)

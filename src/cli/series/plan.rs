@@ -11,14 +11,13 @@ use super::plan_targets::targets;
 use super::plan_touches::{self, TouchArgs};
 use super::simulate::Mount;
 use crate::cli::Verdict;
-use crate::cli::flags::arguments::pair;
+use crate::cli::flags::arguments::{command_of_report, pair};
 use crate::cli::flags::choices::Model;
 use crate::cli::flags::pose_argument::pose_or_file;
 use crate::cli::flags::robot::{noted_chain, read_chain, refuse_degrees};
 use crate::cli::results::show::read_solution;
 use crate::cli::terminal::say::{say, say_line};
 use crate::error::{Code, Error, Result};
-use crate::files::word;
 use crate::geom::{OrientedBox, Pose};
 use crate::identify::RobotModel;
 use crate::model::camera::Camera;
@@ -218,8 +217,7 @@ pub fn run(args: &PlanArgs) -> Result<Verdict> {
     }
     forecast.words.extend(words);
     check_demand(&request, &forecast)?;
-    let command: Vec<String> = crate::cli::command_line().iter().skip(1).map(word).collect();
-    let command = format!("robotcal {}", command.join(" "));
+    let command = command_of_report();
     let mut more = plan_programs::programs(&request, &plan);
     more.insert("plan.html".into(), plan_html(&request, &plan, &forecast, &command).into_bytes());
     let files = plan_files::plan_files(&request, &plan, &forecast, &command, more)?;
