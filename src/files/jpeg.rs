@@ -1,6 +1,6 @@
 //! Does a JPEG file end where its image does?
 
-use std::io::{BufRead, Result, Seek};
+use std::io::{BufRead, Result, Seek, SeekFrom};
 
 pub(super) const START: [u8; 2] = [0xff, 0xd8];
 const SCAN: u8 = 0xda;
@@ -29,9 +29,22 @@ pub fn lacking(source: &mut (impl BufRead + Seek)) -> Result<Option<Lacking>> {
         return Ok(None);
     }
     let mut bytes = Vec::new();
+    // Most files end with the mark; one further before may be that of a picture in the segments before the scan.
+    let length = source.seek(SeekFrom::End(0))?;
+    source.seek(SeekFrom::Start(length.saturating_sub(END.len() as u64)))?;
+    source.read_to_end(&mut bytes)?;
+    if bytes == END {
+        return Ok(None);
+    }
+    bytes.clear();
+    source.rewind()?;
     source.read_to_end(&mut bytes)?;
     let first = bytes.strip_prefix(&START).and_then(first_scan);
-    Ok(first.filter(|first| !first.scan.windows(2).any(|two| two == END)).map(|first| first.lacking))
+    Ok(first.filter(|first| !has_end(first.scan)).map(|first| first.lacking))
+}
+
+fn has_end(bytes: &[u8]) -> bool {
+    bytes.windows(END.len()).any(|two| two == END)
 }
 
 /// The first scan and what follows, and what is lacking if that has no end.

@@ -104,16 +104,13 @@ pub fn is_whole(path: &Path) -> Result<bool> {
     let (mut file, length) = open(path, FileKind::Image)?;
     let (mut start, mut end) = (Vec::new(), Vec::new());
     file.by_ref().take(PNG.len() as u64).read_to_end(&mut start).map_err(io)?;
+    if start != PNG {
+        return Ok(!start.starts_with(&jpeg::START) || jpeg::lacking(&mut BufReader::new(file)).map_err(io)?.is_none());
+    }
     file.seek(SeekFrom::Start(length.saturating_sub(TAIL))).map_err(io)?;
     file.take(TAIL).read_to_end(&mut end).map_err(io)?;
-    let has = |bytes: &[u8], mark: &[u8]| bytes.windows(mark.len()).any(|window| window == mark);
-    if start == PNG {
-        return Ok(has(&end, PNG_END) || has(&read(path, FileKind::Image)?, PNG_END));
-    }
-    if !start.starts_with(&jpeg::START) || (length > TAIL && has(&end, &jpeg::END)) {
-        return Ok(true);
-    }
-    Ok(jpeg::lacking(&mut Cursor::new(read(path, FileKind::Image)?)).map_err(io)?.is_none())
+    let has_end = |bytes: &[u8]| bytes.windows(PNG_END.len()).any(|window| window == PNG_END);
+    Ok(has_end(&end) || has_end(&read(path, FileKind::Image)?))
 }
 
 /// How many pages a TIFF file has, and which of them is read, from 1 on; `None` for other files and where there is one.

@@ -47,7 +47,9 @@ fn load_from(path: &Path, source: impl BufRead + Seek, bits: Option<u32>) -> Res
     let picture = to_picture(&decoded);
     let lacking = match jpeg::lacking(&mut source).unwrap_or_default() {
         Some(Lacking::Rows) if ends_in_one_value(&picture) => Some("the file ends before the lowest rows of the image"),
-        Some(Lacking::Scans) => Some("the file ends before the last scan of the image, which is blurred without it"),
+        Some(Lacking::Scans) => {
+            Some("the file ends without a mark of the end: its last scan may be missing, without which it is blurred")
+        }
         Some(Lacking::Rows) | None => None,
     };
     if let Some(what) = lacking {
