@@ -9,7 +9,9 @@ pub fn word(name: impl Display) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%#".contains(c);
     match () {
         () if !name.is_empty() && name.chars().all(is_plain) && !name.starts_with('#') => name,
-        () if name.contains(['"', '$', '`', '!']) => format!("'{}'", name.replace('\'', "'\\''")),
+        () if name.contains(['"', '$', '`', '!']) || (cfg!(not(windows)) && name.contains('\\')) => {
+            format!("'{}'", name.replace('\'', "'\\''"))
+        }
         () => format!("\"{name}\""),
     }
 }
@@ -37,6 +39,7 @@ mod tests {
             ("it's (2)", "\"it's (2)\""),
             ("a$b's", "'a$b'\\''s'"),
             ("", "\"\""),
+            ("my run\\", if cfg!(windows) { "\"my run\\\"" } else { "'my run\\'" }),
         ] {
             assert_eq!(word(name), in_shell);
         }

@@ -246,6 +246,7 @@ fn camera_files_of_other_programs_that_are_not_read_are_named_as_such() {
     let out = folder.path().join("camera.yml");
     for (name, bytes) in [
         ("stereo.mat", &b"MATLAB 5.0 MAT-file, Platform: GLNXA64\0\xff\xfe"[..]),
+        ("stereo.yaml", &b"MATLAB 7.3 MAT-file, Platform: GLNXA64\0\xff\xfe"[..]),
         ("calib.json", b"{\"Calibration\": {\"cameras\": []}}"),
     ] {
         let file = folder.path().join(name);
@@ -254,6 +255,9 @@ fn camera_files_of_other_programs_that_are_not_read_are_named_as_such() {
         assert_eq!(output.status.code(), Some(2), "{}", text(&output));
         assert_says(&text(&output), Code::SettingSyntax, &[name]);
     }
+    let typo = folder.path().join("typo.mat");
+    let output = robotcal(&["convert", typo.to_str().unwrap(), out.to_str().unwrap(), "--as", "opencv"]);
+    assert_says(&text(&output), Code::FileMissing, &["typo.mat"]);
 }
 
 #[test]

@@ -170,11 +170,11 @@ pub fn read_camera_file(path: &Path, wanted: Option<&str>) -> Result<ReadCamera>
 }
 
 /// How the files begin in which MATLAB stores its variables.
-const MAT: &[u8] = b"MATLAB ";
+const MAT: [&[u8]; 2] = [b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"];
 
 fn refuse_mat(path: &Path) -> Result<()> {
-    let is_named_so = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat"));
-    if !is_named_so && !files::read(path, FileKind::Settings)?.starts_with(MAT) {
+    let bytes = files::read(path, FileKind::Settings)?;
+    if !MAT.iter().any(|head| bytes.starts_with(head)) {
         return Ok(());
     }
     let what = "is a MAT-file of MATLAB, which is not read";
