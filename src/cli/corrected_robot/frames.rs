@@ -28,7 +28,7 @@ use crate::output::frames_record::{
 use crate::output::restore::{FoundModel, chain, exported_model, robot_description};
 use crate::output::solution_json::SolutionRecord;
 use crate::output::work_findings::{from_below, other_frame};
-use crate::output::{ResultFolder, folder_name, touch_plan};
+use crate::output::{ResultFolder, folder_name, plan_files, touch_plan};
 use crate::problem::MeasuredSeries;
 use crate::series::{self, InputFile, Series};
 use crate::urdf::{RobotDescription, patch_origins};
@@ -68,6 +68,8 @@ pub struct FramesArgs {
 struct Measured {
     touches: Touches,
     files: Vec<InputFile>,
+    /// Their plans.
+    plans: Vec<InputFile>,
     notices: Vec<Notice>,
     /// Stops with the joint values of a plan.
     as_planned: Vec<String>,
@@ -78,7 +80,7 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     let record = read_solution(&args.from)?;
     let description = robot_description(&record)?;
     let found = exported_model(&record)?;
-    let Measured { mut touches, files, notices, as_planned } = read_touches(args, &record, &description)?;
+    let Measured { mut touches, files, plans, notices, as_planned } = read_touches(args, &record, &description)?;
     let nothing = touches.all.is_empty();
     let zeros = if nothing { args.readings.of_none()? } else { args.readings.of(&record, &files)? };
     zeros.iter().for_each(|zeros| touches.add(&zeros.missing));
@@ -120,7 +122,7 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
             tip: record.robot.tip.clone(),
             checks: checks(&robot),
         },
-        inputs: files,
+        inputs: files.into_iter().chain(plans).collect(),
         tool: tool_told.then(|| tool_record(args, &record, &fitted, &touches)),
         work: fitted.work.as_ref().map(|pose| WorkRecord {
             name: work_name(&touches),
@@ -256,6 +258,7 @@ fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotD
         return Ok(Measured {
             touches: Touches::default(),
             files: Vec::new(),
+            plans: Vec::new(),
             notices: Vec::new(),
             as_planned: Vec::new(),
         });
@@ -263,6 +266,7 @@ fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotD
     let chain = chain(record, description, &record.robot.base, &record.robot.tip)?;
     let (mut all, mut files, mut notices, mut as_planned): (Vec<MeasuredSeries>, Vec<_>, Vec<_>, Vec<_>) =
         Default::default();
+    let mut plans = Vec::new();
     for folder in &args.touches {
         holds_touches(folder)?;
         let s = series::read(folder)?;
@@ -270,11 +274,15 @@ fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotD
         let measured = measure_bodies(&s, &chain, false)?;
         files.extend(s.inputs);
         notices.extend(measured.notices);
-        as_planned.extend(touch_plan::as_planned(folder, &chain, touched(&measured.series))?);
+        let plan = folder.join(plan_files::FILE_NAME);
+        if plan.is_file() {
+            as_planned.extend(touch_plan::as_planned(&plan, &chain, touched(&measured.series))?);
+            plans.push(InputFile::of_file(&plan)?);
+        }
         all.push(measured.series);
     }
     notices.extend(leave_out_repeated_bodies(&mut all)?);
-    Ok(Measured { touches: Touches::of(&all)?, files, notices, as_planned })
+    Ok(Measured { touches: Touches::of(&all)?, files, plans, notices, as_planned })
 }
 
 /// Stops at which something was touched, with their readings.

@@ -159,11 +159,11 @@ fn stop(k: usize) -> String {
 
 /// Readings as joints.csv has them.
 fn shown(readings: &[f64], chain: &Chain) -> Vec<String> {
-    let one = |(q, kind): (&f64, &JointKind)| match kind {
+    let one = |(q, kind): (f64, &JointKind)| match kind {
         JointKind::Prismatic => format!("{q:.6}"),
-        _ => format!("{:.4}", q.to_degrees()),
+        _ => format!("{q:.4}"),
     };
-    readings.iter().zip(&chain.reading_kinds).map(one).collect()
+    plan_files::written(readings, &chain.reading_kinds).into_iter().zip(&chain.reading_kinds).map(one).collect()
 }
 
 fn joints(planned: &[PlannedTouch], chain: &Chain) -> String {

@@ -12,7 +12,7 @@ use crate::output::text::{as_written, json};
 use crate::urdf::Chain;
 
 /// One touch of a plan.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TouchStop {
     /// Its stop.
     pub stop: String,
@@ -58,20 +58,16 @@ struct PlannedReadings {
 }
 
 /// Of stops with their readings (rad or m, in the order of the chain) those whose readings are, to the last digit that a plan writes, those
-/// of the plan in the same folder; none without plan.json, or where it is of other joints.
+/// of this plan.json; none where it is of other joints.
 ///
 /// # Errors
 /// A plan.json that cannot be read.
 pub fn as_planned<'a>(
-    folder: &Path,
+    path: &Path,
     chain: &Chain,
     stops: impl Iterator<Item = (&'a str, &'a [f64])>,
 ) -> Result<Vec<String>> {
-    let path = folder.join(FILE_NAME);
-    if !path.is_file() {
-        return Ok(Vec::new());
-    }
-    let bytes = files::read(&path, FileKind::Settings)?;
+    let bytes = files::read(path, FileKind::Settings)?;
     // Plans of before have no readings of touches.
     let syntax = |e| Error::new(Code::SettingSyntax, path.display(), e, "plan again, or remove the file");
     let record: serde_json::Value = serde_json::from_slice(&bytes).map_err(syntax)?;
