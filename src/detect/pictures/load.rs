@@ -43,7 +43,13 @@ pub fn load_bytes(path: &Path, bytes: &[u8], bits: Option<u32>) -> Result<Pictur
 
 fn load_from(path: &Path, source: impl BufRead + Seek, bits: Option<u32>) -> Result<Picture> {
     let mut source = source;
-    let decoded = decode_picture(&mut source).map_err(|e| decode_error(path, &e))?;
+    let decoded = match decode_picture(&mut source) {
+        Ok(decoded) => decoded,
+        Err(_) if jpeg::lacking(&mut source).is_ok_and(|lacking| lacking.is_some()) => {
+            return Err(truncated(path, "the file ends before its image does"));
+        }
+        Err(e) => return Err(decode_error(path, &e)),
+    };
     let picture = to_picture(&decoded);
     let lacking = match jpeg::lacking(&mut source).unwrap_or_default() {
         Some(Lacking::Rows) if ends_in_one_value(&picture) => Some("the file ends before the lowest rows of the image"),
@@ -53,7 +59,7 @@ fn load_from(path: &Path, source: impl BufRead + Seek, bits: Option<u32>) -> Res
         Some(Lacking::Rows) | None => None,
     };
     if let Some(what) = lacking {
-        return Err(Error::new(Code::ImageTruncated, path.display(), what, "copy or record the image again"));
+        return Err(truncated(path, what));
     }
     if picture.width < 2 || picture.height < 2 {
         return Err(Error::new(
@@ -78,6 +84,10 @@ fn ends_in_one_value(picture: &Picture) -> bool {
     lowest.iter().all(|value| *value == lowest[0])
 }
 
+fn truncated(path: &Path, what: &str) -> Error {
+    Error::new(Code::ImageTruncated, path.display(), what, "copy or record the image again")
+}
+
 fn decode_error(path: &Path, error: &ImageError) -> Error {
     let place = path.display();
     match error {
@@ -94,7 +104,7 @@ fn decode_error(path: &Path, error: &ImageError) -> Error {
             format!("check the file header; sides up to {MOST_SIDE_PX} px and some hundred megapixels are read"),
         ),
         ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
-            Error::new(Code::ImageTruncated, place, "the file is truncated", "copy or record the image again")
+            truncated(path, "the file is truncated")
         }
         other => Error::new(
             Code::ImageUnreadable,
