@@ -51,7 +51,7 @@ pub(super) fn leave_out_repeated(
     leave_out(&shown, all)
 }
 
-/// As [`leave_out_repeated`], for series without images.
+/// Leaves out what trackers and contacts measured in a series before with the same readings, to the last digit; of series without images.
 ///
 /// # Errors
 /// A series all of whose measurements are in those before it.
