@@ -97,16 +97,16 @@ impl Repeated {
     fn of(own: &MeasuredSeries, index: usize, before: &[MeasuredSeries], shown: &[Shown]) -> Self {
         let measured = Before::of(own, before);
         let picture = |series: usize, row: usize| shown.get(series).and_then(|s| *s.pictures.get(row)?);
-        // Of one picture a second pass may have found more of the plate in one series than in the other.
-        let is_picture = |row: usize, (other, of): Place| {
-            let is_same = picture(index, row).is_some() && picture(index, row) == picture(other, of);
-            is_same && shown[index].plate == shown[other].plate
-        };
+        let is_picture = |row, of: Place| picture(index, row).is_some() && picture(index, row) == picture(of.0, of.1);
         let image = |(row, stop): (usize, &MeasuredStop)| {
-            let is_original =
-                |of: &&Place| is_picture(row, **of) || before[of.0].stops[of.1].observations == stop.observations;
-            let of = *measured.stops.get(&key(stop))?.iter().find(is_original)?;
-            Some((row, (of, picture(index, row).is_some() && picture(index, row) == picture(of.0, of.1))))
+            let repeats = |of: &Place| {
+                let is_picture = is_picture(row, *of);
+                // Of one picture a second pass may have found more of the plate in one series than in the other.
+                let is_of_one_plate = is_picture && shown[index].plate == shown[of.0].plate;
+                let is_same = is_of_one_plate || before[of.0].stops[of.1].observations == stop.observations;
+                is_same.then_some((*of, is_picture))
+            };
+            Some((row, measured.stops.get(&key(stop))?.iter().find_map(repeats)?))
         };
         let body = |(b, body): (usize, &SeenBody)| {
             let is_original = |of: &&Place| {
