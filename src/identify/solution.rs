@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::comparison::Comparison;
 use super::estimator::Estimator;
 use super::options::Options;
 use super::start_verdict::StartVerdict;
-use super::two_stage::comparison::Comparison;
 use crate::assess::{Accuracy, ImageError, Uncertainty};
 use crate::diagnose::Finding;
 use crate::error::Notice;

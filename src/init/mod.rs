@@ -1,5 +1,6 @@
 //! Starting values from nothing: homographies, focal length, poses, hand-camera and plate pose.
 
+pub(crate) mod bases;
 mod between;
 mod focal;
 mod hand_eye;
@@ -7,7 +8,6 @@ mod homography;
 mod resection;
 mod zeros;
 
-pub use between::{PoseTriple, solve_between};
 pub use focal::{FocalCandidate, focal_candidates};
 pub use hand_eye::{HandEye, HandEyeStart, PosePair, hand_eye_misfit, plate_scale, shah, solve_hand_eye};
 pub use homography::{Homography, PlanarPose};

@@ -10,8 +10,7 @@ use super::readings::shifted_rows;
 use super::suspects::{Suspects, some_of};
 use crate::assess::best_run;
 use crate::diagnose::{MistakeKind, ShiftedPart};
-use crate::identify::start::bases;
-use crate::init::{PosePair, SeenStop, solve_hand_eye};
+use crate::init::{PosePair, SeenStop, bases, solve_hand_eye};
 
 impl Suspects<'_> {
     /// Shifts of a part of the rows by one, for either direction in which there is one, with the misfit that they leave.

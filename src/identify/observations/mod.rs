@@ -11,5 +11,5 @@ mod plates;
 pub(super) mod repeated;
 mod second_pass;
 pub(super) mod seen_image;
-pub(super) mod stated;
+mod stated;
 pub(super) mod together;

@@ -7,12 +7,13 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::seen_image::SeenImage;
-use super::stated::{CameraStart, lens_of, measured_series};
+use super::stated::{lens_of, measured_series};
 use crate::assess::Limits;
 use crate::detect::Picture;
 use crate::detect::circles::{Predicted, detect_predicted};
 use crate::error::Result;
 use crate::geom::Pose;
+use crate::identify::photogrammetry::camera_start::CameraStart;
 use crate::identify::photogrammetry::free_poses::adjust_free_poses;
 use crate::identify::problem::build::build;
 use crate::model::robot::Robot;

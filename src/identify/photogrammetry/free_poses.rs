@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, Matrix6, Vector2};
 
+use super::camera_start::{CameraStart, camera_starts};
 use super::numbering::with_numbering;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::fit::{FocalLength, FreePose, FreePoses, PlacedCamera};
 use crate::geom::{Pose, adjoint};
-use crate::identify::observations::stated::{CameraStart, camera_starts};
 use crate::identify::problem::build::build;
 use crate::identify::start_verdict::{StartReached, StartVerdict};
 use crate::init::{FocalCandidate, Homography, focal_candidates, resect};
@@ -508,7 +508,7 @@ fn linearised(moved: &Adjustment) -> Result<Linearised> {
 ///
 /// # Errors
 /// Markers that define no frame.
-pub(super) fn covariance_together(fit: &Fit) -> Result<DMatrix<f64>> {
+pub(in crate::identify) fn covariance_together(fit: &Fit) -> Result<DMatrix<f64>> {
     let (moved, _) = in_own_frames(fit)?;
     let lin = linearised(&moved)?;
     let linear = moved.linear(&lin);

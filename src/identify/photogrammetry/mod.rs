@@ -1,9 +1,8 @@
 //! Images alone -> cameras, plates and camera poses; no robot takes part.
 //!
-//! `free_poses` is the adjustment that all else starts from; `stand_alone` makes a result of its own of it, which `pose_comparison` puts beside poses of
-//! another source.
+//! `camera_start` says what is known before; `free_poses` is the adjustment that all else starts from; `numbering` names markers that are numbered
+//! in another way than the plate file says.
 
+pub(super) mod camera_start;
 pub(super) mod free_poses;
 mod numbering;
-pub(super) mod pose_comparison;
-pub(super) mod stand_alone;

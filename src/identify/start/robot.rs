@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::bases;
 use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, ReadingRatio, RowsOf};
 use crate::error::{Code, Error, Quantity, Result};
@@ -13,7 +12,8 @@ use crate::identify::mistakes::breaks::broken;
 use crate::identify::mistakes::suspects::{Suspects, best_scale, directions_alone, left_by_scale};
 use crate::identify::start_verdict::{StartReached, StartVerdict};
 use crate::init::{
-    HandEye, HandEyeStart, PosePair, SeenStop, Zeros, hand_eye_misfit, shah, solve_hand_eye, solve_slopes, solve_zeros,
+    HandEye, HandEyeStart, PosePair, SeenStop, Zeros, bases, hand_eye_misfit, shah, solve_hand_eye, solve_slopes,
+    solve_zeros,
 };
 use crate::linalg::median;
 use crate::linalg::symmetric_eigen;

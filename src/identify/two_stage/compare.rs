@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::comparison::{Comparison, ComparisonRow, HeldOut, TruthError};
 use super::fit::{PoseStage, fit_joint, fit_poses};
 use crate::assess::{
     ImageError, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, error_of_predicted, flange_error_m,
@@ -11,6 +10,7 @@ use crate::assess::{
 };
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
+use crate::identify::comparison::{Comparison, ComparisonRow, HeldOut, TruthError};
 use crate::identify::estimator::Estimator;
 use crate::identify::options::JointNoise;
 use crate::identify::solution::Solution;

@@ -1,24 +1,25 @@
 //! How the bases of two arms stand to each other, from what both read and the camera sees.
 
+use super::between::{PoseTriple, solve_between};
+use super::zeros::SeenStop;
 use crate::geom::Pose;
-use crate::init::{PoseTriple, SeenStop, solve_between};
 use crate::model::robot::Robot;
 use crate::series::CameraMount;
 use crate::urdf::{FoundOrigin, Joint};
 
 /// The joint between the bases of two arms that has no origin yet.
-pub(super) fn unplaced(robot: &Robot) -> Option<usize> {
+pub fn unplaced(robot: &Robot) -> Option<usize> {
     robot.chain.joints.iter().position(|j| j.is_between_bases() && j.origin == Pose::identity())
 }
 
 /// The joint between the bases of two arms whose origin was found.
-pub(in crate::identify) fn found(robot: &Robot) -> Option<usize> {
+pub fn found(robot: &Robot) -> Option<usize> {
     let is_found = |j: &Joint| j.is_between_bases() && matches!(j.found, Some(FoundOrigin::Pose));
     robot.chain.joints.iter().position(is_found)
 }
 
 /// The robot with the origin of this joint between its bases as these stops have it; `None` where they do not tell.
-pub(in crate::identify) fn placed(robot: &Robot, joint: usize, stops: &[SeenStop]) -> Option<Robot> {
+pub fn placed(robot: &Robot, joint: usize, stops: &[SeenStop]) -> Option<Robot> {
     let mount = stops.first()?.mount;
     let triple = |stop: &SeenStop| {
         let behind = robot.link_poses(&stop.readings);

@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix3x6, Matrix6};
 
-use super::free_poses::{covariance_together, free_poses_of};
 use crate::assess::{Limits, camera_shows_pattern};
 use crate::diagnose::{
     CheckContext, Diagnosis, Finding, many_left_out, observations_left_out, residual_pattern, tags_off, uneven_plates,
@@ -11,6 +10,7 @@ use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{Fit, FreePose, FreePoses, PlacedCamera};
 use crate::geom::skew;
 use crate::identify::model_choice::lens_choice::{choose_lens, losses, open_cameras};
+use crate::identify::photogrammetry::free_poses::{covariance_together, free_poses_of};
 use crate::identify::solution::Solution;
 use crate::identify::start_verdict::StartVerdict;
 use crate::model::camera::Lens;
