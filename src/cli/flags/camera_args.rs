@@ -6,6 +6,7 @@ use clap::Args;
 
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::word;
+use crate::model::camera::Lens;
 use crate::output::camera_formats::{ReadCamera, read_camera_file};
 use crate::problem::{KnownCamera, LensChoice, MeasuredSeries};
 
@@ -42,7 +43,7 @@ impl CameraArgs {
             Some(AUTO) => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::All),
             Some(ROS) => series.iter_mut().for_each(|s| s.lens_choice = LensChoice::Exported),
             Some(name) => {
-                let lens = crate::cli::series::simulate::lens(name).map_err(with_choices)?;
+                let lens = lens(name).map_err(with_choices)?;
                 series.iter_mut().for_each(|s| (s.lens, s.lens_choice) = (lens, LensChoice::Settled));
             }
             None => {}
@@ -88,6 +89,14 @@ impl CameraArgs {
         }
         Ok(lost.map(|lost| Notice::new(Code::LensChosen, path.display(), lost, "")))
     }
+}
+
+/// The lens of a name on the command line.
+pub fn lens(name: &str) -> Result<Lens> {
+    Lens::from_name(name).ok_or_else(|| {
+        let remedy = format!("use one of: {}", Lens::names().join(", "));
+        Error::new(Code::LensUnknown, "lens", format!("'{name}' is not a lens model of this program"), remedy)
+    })
 }
 
 /// Whether a file that is there stands behind a name.

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use crate::cli::Verdict;
+use crate::cli::flags::camera_args::lens;
 use crate::cli::flags::robot::read_chain;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::say::{say, say_line};
 use crate::error::{Code, Error, Result};
-use crate::model::camera::Lens;
 use crate::output::NewFolder;
 use crate::plan::plate_design::{PlateRequest, design};
 use crate::plan::viewpoint::ViewRange;
@@ -207,14 +207,6 @@ fn conditions(args: &SimulateArgs) -> Result<ImagingConditions> {
         return Err(Error::new(Code::OptionRange, "--bits", conditions.bits, "give 8, 10, 12 or 16"));
     }
     Ok(conditions)
-}
-
-/// The lens of a name on the command line.
-pub fn lens(name: &str) -> Result<Lens> {
-    Lens::from_name(name).ok_or_else(|| {
-        let remedy = format!("use one of: {}", Lens::names().join(", "));
-        Error::new(Code::LensUnknown, "lens", format!("'{name}' is not a lens model of this program"), remedy)
-    })
 }
 
 fn request(args: &SimulateArgs) -> Result<WorldRequest> {
