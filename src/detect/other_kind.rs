@@ -3,8 +3,9 @@
 use super::Picture;
 use super::boards::charuco_seen::agreed;
 use super::boards::chessboard::find_lattice;
-use super::boards::labels::{BoardSize, Shader, parity};
+use super::boards::labels::{Shader, parity};
 use super::boards::seen::{BoardSeen, SQUARES, trimmed};
+use super::corners::lattice::BoardSize;
 use super::tags::code::Reader;
 use super::tags::quads::Quad;
 use super::tags::scan::{all_dictionaries, certain, passes, scan, usual_dictionaries};

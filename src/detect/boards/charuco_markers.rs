@@ -9,7 +9,7 @@ use calib_targets_chessboard::ChessCorner;
 use calib_targets_core::{Coord, GrayImageView};
 
 use super::corner_finder::corner_config;
-use super::labels::BoardSize;
+use crate::detect::corners::lattice::BoardSize;
 use crate::detect::tags::scan::usual_dictionaries;
 use crate::error::{Code, Error, Result};
 use crate::series::{Plate, dictionary_named};

@@ -6,8 +6,9 @@
 use std::collections::BTreeMap;
 
 use super::charuco_markers::Print;
-use super::labels::{BoardSize, Lattice, Shader};
+use super::labels::Shader;
 use crate::detect::Picture;
+use crate::detect::corners::lattice::{BoardSize, Lattice};
 use crate::detect::tags::code::Reader;
 use crate::series::{TagPrint, Tags};
 

@@ -9,9 +9,10 @@ use calib_targets_chessboard::{ChessboardCorner, ChessboardDetection, Chessboard
 
 use super::corner_finder::find_corners;
 use super::ends::Ends;
-use super::labels::{BoardSize, Labelling, Lattice, Placement, label};
+use super::labels::{Labelling, label};
 use super::seen::BoardSeen;
 use super::sizes::on_picture;
+use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 use crate::detect::corners::{Window, measure};
 use crate::detect::pictures::bytes::Bytes;
 use crate::detect::{Detection, Outline, Picture};

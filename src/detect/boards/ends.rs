@@ -3,9 +3,10 @@
 //! A hand, a sheet or glare hides squares, and what it leaves looks as if the board ended there. A board ends along one of its lines: over
 //! the width of a few pixels, beside all squares of the line, and with squares of full contrast before it.
 
-use super::labels::{BoardSize, Labelling, Lattice, Placement, Shader, parity};
+use super::labels::{Labelling, Shader, parity};
 use super::seen::{Beyond, Range, SQUARES, even_cells, followed, trimmed};
 use crate::detect::Picture;
+use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 
 /// How far from the end of the squares they are looked at, px ...
 const BESIDE_PX: f64 = 2.5;

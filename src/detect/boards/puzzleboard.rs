@@ -11,9 +11,10 @@ use calib_targets_puzzleboard::{
 
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
-use super::labels::{BoardSize, Lattice, Placement, brightness};
+use super::labels::brightness;
 use super::sizes::{best_of_sizes, on_picture};
 use crate::detect::circles::{FALSE_ALARMS, binomial_tail};
+use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 use crate::detect::corners::{Window, measure};
 use crate::detect::pictures::bytes::Bytes;
 use crate::detect::shared::KEEP_OFF_PX;

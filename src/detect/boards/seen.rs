@@ -2,8 +2,9 @@
 //!
 //! The squares go on as long as the cells of a further line alternate in their two colours, and end in view where they do not.
 
-use super::labels::{BoardSize, Lattice, Line, Shader, bounds, parity};
+use super::labels::{Line, Shader, bounds, parity};
 use crate::detect::Picture;
+use crate::detect::corners::lattice::{BoardSize, Lattice};
 use crate::detect::size_seen::{Counted, end_to_end, other_size};
 use crate::error::Error;
 

@@ -1,6 +1,6 @@
 //! At which size of the picture a board with a code is found best.
 
-use super::labels::{BoardSize, Lattice};
+use crate::detect::corners::lattice::{BoardSize, Lattice};
 use crate::detect::pictures::bytes::Bytes;
 use crate::error::Result;
 

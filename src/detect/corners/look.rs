@@ -5,11 +5,11 @@
 //! a pixel it lies. Such a picture is smoothed first, which adds a known blur and takes away what lies beyond the sampling limit.
 
 use super::fit::{Look, Saddle, Seed, Window, refine};
+use super::lattice::Lattice;
 use super::neighbours::{REACH, seed};
 use super::refusal::Refusal;
 use super::smooth::Source;
 use crate::detect::Picture;
-use crate::detect::boards::labels::Lattice;
 use crate::linalg::median;
 
 /// Corners that say how the edges look, at most.

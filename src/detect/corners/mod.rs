@@ -1,6 +1,7 @@
-//! From a labelled lattice of corners to observations.
+//! From a labelled lattice of corners (`lattice`) to observations.
 
 mod fit;
+pub(super) mod lattice;
 mod look;
 mod model;
 mod neighbours;
@@ -17,6 +18,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use fit::Saddle;
 pub(super) use fit::Window;
+use lattice::{Lattice, Placement};
 use look::Sight;
 pub(super) use look::quantile;
 use neighbours::{FAR_REACH, REACH, seed};
@@ -25,7 +27,6 @@ use outline::outline;
 use refusal::Refusal;
 use rim::out_of_line;
 
-use super::boards::labels::{Lattice, Placement};
 use super::{Detection, Dropped, Picture};
 use crate::linalg::median;
 use crate::series::{Edge, Observation};

@@ -1,7 +1,7 @@
 //! Where a corner should be, by the corners around it.
 
 use super::fit::Seed;
-use crate::detect::boards::labels::Lattice;
+use super::lattice::Lattice;
 use crate::geom::PlaneMap;
 
 /// Neighbours up to this many squares away say where a corner is and how the edges run ...

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::fit::{LEAST_MARGIN_PX, Saddle};
+use super::lattice::{Lattice, Placement};
 use super::neighbours::{FAR_REACH, seed};
-use crate::detect::boards::labels::{Lattice, Placement};
 use crate::detect::shared::{LEAST_IN_VIEW, MISSING};
 use crate::detect::{Outline, Picture};
 
