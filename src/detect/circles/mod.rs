@@ -11,7 +11,9 @@
 //! Every stage is a pure function of the picture; none knows a camera or a robot.
 
 mod candidates;
+mod drift;
 mod edge;
+mod ellipse;
 mod grid;
 mod identity;
 mod measuring;
@@ -22,12 +24,12 @@ pub(crate) mod synth;
 mod types;
 
 pub(super) use candidates::contour::{Contour, Encloses, contours};
-pub use candidates::ellipse::Ellipse;
 pub(super) use candidates::levels::Levels;
+pub use drift::Drift;
 pub(super) use edge::gauss::normal_tail;
+pub use ellipse::Ellipse;
 pub use grid::pipeline::detect_grid;
 pub(super) use identity::code::{FALSE_ALARMS, binomial_tail};
-pub use measuring::asymmetry::Drift;
 pub use measuring::measure::measure;
 pub use measuring::predicted::Predicted;
 pub use measuring::predicted_pass::{detect_predicted, measure_predicted};

@@ -3,15 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::candidates::candidate::{Candidate, candidates, largest_marker};
-use super::candidates::ellipse::Ellipse;
 use super::candidates::levels::Levels;
+use super::drift::Drift;
 use super::edge::model::Pixels;
 use super::edge::refine::{Fit, refine};
+use super::ellipse::Ellipse;
 use super::identity::code::{MarkerCode, Verdict};
 use super::identity::lattice::{Apart, Buckets, Cell, Lattice, lattices};
 use super::identity::neighbour_check::{Board, Placed, around, check_neighbours, continuation, neighbourhood};
 use super::measuring::agreement::{Inner, Seen, agreement};
-use super::measuring::asymmetry::Drift;
 use super::measuring::glare::allow_for_glare;
 use super::measuring::measure::{Camera, THRESHOLD, Target, drop_target, learn, target_of};
 use super::measuring::predicted::Predicted;

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use super::candidates::ellipse::Ellipse;
-use super::measuring::asymmetry::Drift;
+use super::drift::Drift;
+use super::ellipse::Ellipse;
 use crate::error::{Code, Notice};
 use crate::series::{Edge, Observation};
 

@@ -1,9 +1,9 @@
 //! Candidates: contours that may be the image of a marker, after the quality tests.
 
 use super::contour::{Contour, Encloses, contours};
-use super::ellipse::Ellipse;
 use super::levels::Levels;
 use crate::detect::Picture;
+use crate::detect::circles::ellipse::Ellipse;
 use crate::detect::circles::types::{DroppedCandidate, Options, Reason};
 
 /// A dark ellipse, perhaps with a light one in its middle.

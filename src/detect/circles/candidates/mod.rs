@@ -2,5 +2,4 @@
 
 pub(super) mod candidate;
 pub(super) mod contour;
-pub(super) mod ellipse;
 pub(super) mod levels;

@@ -7,7 +7,7 @@
 use super::exact::Contour;
 use super::gauss::LANES;
 use super::model::Pixels;
-use crate::detect::circles::candidates::ellipse::Ellipse;
+use crate::detect::circles::ellipse::Ellipse;
 use crate::detect::circles::types::Measured;
 
 /// Largest coverage by neighbours of a pixel that is still used: one sigma of the blur from their edge. Beyond it their

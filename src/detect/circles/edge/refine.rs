@@ -6,7 +6,7 @@ use super::nearby_ink::{NearbyInk, lift};
 use super::squares::Squares;
 use super::state::{ANNULUS, CENTRE, DARK, DISC, INNER, LN_BLUR, LN_RATIO, SHAPE, State, THIRD, WHITE};
 use crate::detect::Picture;
-use crate::detect::circles::candidates::ellipse::Ellipse;
+use crate::detect::circles::ellipse::Ellipse;
 use crate::detect::circles::types::{Imaged, Measured, Reason};
 use crate::detect::shared::{GLARE_SLOPE, SATURATED};
 use crate::series::Edge;

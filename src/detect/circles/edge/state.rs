@@ -1,7 +1,7 @@
 //! State of the blurred-edge model and the places of its parameters.
 
 use super::exact::Contour;
-use crate::detect::circles::candidates::ellipse::Ellipse;
+use crate::detect::circles::ellipse::Ellipse;
 
 /// Parameters of a disc.
 pub(super) const DISC: usize = 14;

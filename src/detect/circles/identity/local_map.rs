@@ -1,6 +1,6 @@
 //! The map from the plate to the image around one marker, from the markers next to it.
 
-use crate::detect::circles::candidates::ellipse::Ellipse;
+use crate::detect::circles::ellipse::Ellipse;
 use crate::geom::PlaneMap;
 
 /// Second-order map from the plate (in units of the pitch, relative to the marker, rows down) to the image.

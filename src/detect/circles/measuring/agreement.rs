@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use super::asymmetry::Drift;
+use crate::detect::circles::drift::Drift;
 use crate::detect::circles::identity::lattice::Cell;
 use crate::detect::circles::identity::local_map::LocalMap;
 use crate::detect::circles::types::InnerOuter;

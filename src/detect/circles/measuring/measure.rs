@@ -2,10 +2,10 @@
 
 use crate::detect::Picture;
 use crate::detect::circles::candidates::candidate::{Candidate, candidates, largest_marker};
-use crate::detect::circles::candidates::ellipse::Ellipse;
 use crate::detect::circles::candidates::levels::Levels;
 use crate::detect::circles::edge::model::Pixels;
 use crate::detect::circles::edge::refine::{Fit, Start, refine};
+use crate::detect::circles::ellipse::Ellipse;
 use crate::detect::circles::identity::lattice::Buckets;
 use crate::detect::circles::types::{DroppedCandidate, Measured, Options, Reason};
 use crate::linalg::median;

@@ -5,10 +5,10 @@ use super::measure::{Camera, Target};
 use super::rescue::{is_thin, tie_sigma};
 use crate::detect::Picture;
 use crate::detect::circles::candidates::candidate::Profile;
-use crate::detect::circles::candidates::ellipse::Ellipse;
 use crate::detect::circles::edge::model::Pixels;
 use crate::detect::circles::edge::nearby_ink::NearbyInk;
 use crate::detect::circles::edge::refine::{Fit, Start, refine};
+use crate::detect::circles::ellipse::Ellipse;
 use crate::detect::circles::types::{Found, Imaged, Measured, Reason};
 use crate::series::{Edge, Marker};
 
