@@ -23,6 +23,7 @@ mod plan;
 pub(crate) mod report;
 mod robot;
 mod solution;
+pub mod stand_alone_files;
 mod text;
 mod vision;
 mod write;
@@ -45,7 +46,7 @@ pub use robot::kinematics_file::kinematics_yaml;
 pub use solution::{photogrammetry, restore, solution_json};
 #[cfg(feature = "mcap")]
 pub use vision::recording;
-pub use vision::{detection_files, poses_record, stand_alone_files};
+pub use vision::{detection_files, poses_record};
 pub use write::{NewFolder, NewResult, ResultFolder, recover, write_all, write_beside};
 
 use std::collections::BTreeMap;

@@ -4,26 +4,26 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::poses_record::PosesRecord;
-use super::{camera_file, observation_table, plate_files, pose_files};
+use super::gauge::Gauge;
+use super::names::{ImageNames, plate_name};
+use super::npy;
+#[cfg(feature = "report")]
+use super::report::{self, Thumbnails, poses_html};
+use super::solution::finding_record::FindingRecord;
+use super::solution::image_records::ImageRecords;
+use super::solution::solution_json::{ProgramRecord, StatisticsRecord};
+use super::text::json;
+use super::vision::poses_record::PosesRecord;
+use super::vision::{camera_file, observation_table, plate_files, pose_files};
 use crate::assess::Limits;
 use crate::diagnose::Finding;
 use crate::error::{Notice, Result};
 use crate::identify::{PoseComparison, StandAlone, depths_m};
 use crate::model::camera::Lens;
-use crate::output::gauge::Gauge;
-use crate::output::names::{ImageNames, plate_name};
-use crate::output::npy;
-#[cfg(feature = "report")]
-use crate::output::report::{self, Thumbnails, poses_html};
-use crate::output::solution::finding_record::FindingRecord;
-use crate::output::solution::image_records::ImageRecords;
-use crate::output::solution_json::{ProgramRecord, StatisticsRecord};
-use crate::output::text::json;
 use crate::problem::Adjustment;
 use crate::series::InputFile;
 
-pub use super::poses_record::FILE_NAME;
+pub use super::vision::poses_record::FILE_NAME;
 
 /// What the files need beside the adjustment.
 #[derive(Debug, Clone)]

@@ -3,6 +3,7 @@
 use super::solution_json::EstimateRecord;
 use crate::assess::Uncertainty;
 use crate::error::{Code, Error, Result};
+use crate::identify::Solution;
 use crate::output::names::column_names;
 use crate::solve::Fit;
 
@@ -17,6 +18,11 @@ fn share_of_data(fit: &Fit, column: usize) -> Option<f64> {
     let prior = fit.problem.layout.columns[column].prior_sigma;
     let sigma = sigma(fit, column).filter(|_| prior.is_finite())?;
     Some((1.0 - (sigma / prior).powi(2)).max(0.0))
+}
+
+/// True where an image in use ties the six columns of a pose to the data.
+pub fn determined(solution: &Solution, start: usize) -> bool {
+    (start..start + 6).all(|c| solution.fit.covariance.system.touched(c))
 }
 
 /// Every column with what is known of it, beside its covariance what an `uncertainty` says.

@@ -7,7 +7,7 @@
 pub mod bodies_record;
 pub mod bytes;
 mod check;
-mod estimates;
+pub mod estimates;
 pub mod finding_record;
 pub mod image_records;
 pub mod photogrammetry;

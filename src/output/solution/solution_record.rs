@@ -1,7 +1,7 @@
 //! From a solution to the record in solution.json.
 
 use super::bodies_record::BodiesRecord;
-use super::estimates::lower_triangle;
+use super::estimates::{determined, lower_triangle};
 use super::image_records::{ImageRecords, flat};
 use super::solution_json::{
     AccuracyRecord, FORMAT, JointRecord, PlacedRecord, ProgramRecord, RobotRecord, ScatterRecord, SolutionRecord,
@@ -12,7 +12,6 @@ use crate::identify::Solution;
 use crate::model::joint_terms::{JointTerm, Term};
 use crate::output::gauge::Gauge;
 use crate::output::robot::mastering::to_enter;
-use crate::output::vision::pose_files::determined;
 use crate::output::{Context, Offsets};
 use crate::problem::State;
 

@@ -1,7 +1,7 @@
 //! What images tell, as files: detections, cameras, plates, poses and residuals.
 //!
 //! `detection_files` holds what was seen before there is a fit; `camera_file`, `plate_files`, `pose_files` and `observation_table` what a fit made of it, with
-//! or without a robot; `poses_record` and `stand_alone_files` the whole result without one; `recording` marks on the images of a recording.
+//! or without a robot; `poses_record` the whole result without one; `recording` marks on the images of a recording.
 
 pub mod camera_file;
 pub mod detection_files;
@@ -11,4 +11,3 @@ pub mod pose_files;
 pub mod poses_record;
 #[cfg(feature = "mcap")]
 pub mod recording;
-pub mod stand_alone_files;

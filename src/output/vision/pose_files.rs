@@ -7,6 +7,7 @@ use crate::geom::Pose;
 use crate::identify::Solution;
 use crate::output::gauge::Gauge;
 use crate::output::names::{ImageNames, file_names};
+use crate::output::solution::estimates::determined;
 use crate::output::text::{list, quoted};
 use crate::problem::Image;
 use crate::series::{CameraMount, to_csv};
@@ -50,11 +51,6 @@ impl PoseFile<'_> {
             list((0..36).map(|k| 0.5 * (c[(k / 6, k % 6)] + c[(k % 6, k / 6)]))),
         )
     }
-}
-
-/// True where an image in use ties the six columns of a pose to the data.
-pub fn determined(solution: &Solution, start: usize) -> bool {
-    (start..start + 6).all(|c| solution.fit.covariance.system.touched(c))
 }
 
 fn first_on_robot(solution: &Solution, which: impl Fn(&Image) -> bool) -> Option<&Image> {
