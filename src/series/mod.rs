@@ -11,6 +11,7 @@ mod image_file;
 mod inputs;
 mod joints;
 mod manifest;
+mod measurement_series;
 mod named_poses;
 mod observation;
 mod observation_file;
@@ -46,6 +47,7 @@ pub use controller_poses::{ControllerPoses, ReadOtherwise};
 pub use inputs::InputFile;
 pub use joints::{Covariates, DEFAULT_PLACEMENT, SeriesStop, StopKey, Stops};
 pub use manifest::{AngleUnit, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder};
+pub use measurement_series::{Series, Source};
 pub use named_poses::{NamedPoses, read_named_poses};
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::{observations_csv, parse_observations};
@@ -56,7 +58,7 @@ pub use plate_turns::PlateTurn;
 pub use point_file::PointRow;
 pub use pose_file::PoseRow;
 pub use puzzle::{Next, Puzzle};
-pub use read::{Series, Source, read, read_images};
+pub use read::{read, read_images};
 pub use recorded::convert_recording;
 pub use recording::{
     CameraInfo, Clock, Delay, Extracted, Motion, Picking, RecordingOptions, StopReport, extract, is_recording,

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::camera_section::CameraMount;
 use super::manifest::{AngleUnit, Manifest};
-use super::read::{Series, Source, file_name, manifest_beside, optional_images};
+use super::measurement_series::{Series, Source, file_name};
+use super::read::{manifest_beside, optional_images};
 use super::recording::{CameraInfo, Extracted, RecordingOptions, extract};
 use crate::error::{Code, Error, Notice, Result};
 
