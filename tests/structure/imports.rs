@@ -19,8 +19,17 @@ struct Source {
     used: BTreeSet<Module>,
 }
 
-/// Files that import each other.
+/// What a file imports of another one.
+struct Tie {
+    from: PathBuf,
+    to: PathBuf,
+    names: String,
+}
+
+/// Files or folders that import each other.
 pub struct Circle {
+    /// Their paths, in order.
+    pub entries: Vec<PathBuf>,
     /// What ties them, a line an import.
     pub ties: Vec<String>,
 }
@@ -243,37 +252,67 @@ impl Sources {
         all
     }
 
+    /// All imports of files from each other.
+    fn ties(&self) -> Vec<Tie> {
+        let file = |m: &Module| self.0[m].file.clone();
+        let of = |(from, imports): (&Module, BTreeMap<Module, BTreeSet<&str>>)| {
+            let tie = |(to, names): (Module, BTreeSet<&str>)| {
+                let names: Vec<&str> = names.into_iter().collect();
+                Tie { from: file(from), to: file(&to), names: names.join(", ") }
+            };
+            imports.into_iter().map(tie).collect::<Vec<_>>()
+        };
+        self.imports().into_iter().flat_map(of).collect()
+    }
+
     /// Groups of files that import each other in a circle.
     pub fn circles(&self) -> Vec<Circle> {
-        let imports = self.imports();
-        let reached = |from: &Module| {
-            let mut seen: BTreeSet<Module> = BTreeSet::new();
-            let mut open = vec![from.clone()];
-            while let Some(next) = open.pop() {
-                open.extend(imports[&next].keys().filter(|m| seen.insert((*m).clone())).cloned());
-            }
-            seen
-        };
-        let reach: BTreeMap<&Module, BTreeSet<Module>> = self.0.keys().map(|m| (m, reached(m))).collect();
-        let mut circles = Vec::new();
-        let mut done: BTreeSet<&Module> = BTreeSet::new();
-        for module in self.0.keys().filter(|m| reach[m].contains(*m)) {
-            let circle: Vec<&Module> =
-                self.0.keys().filter(|m| reach[module].contains(*m) && reach[m].contains(module)).collect();
-            if done.contains(module) {
-                continue;
-            }
-            done.extend(&circle);
-            let file = |m: &Module| self.0[m].file.as_path();
-            let ties = circle.iter().flat_map(|a| {
-                let within = imports[*a].iter().filter(|(b, _)| circle.contains(b));
-                within.map(|(b, names)| {
-                    let names: Vec<&str> = names.iter().copied().collect();
-                    format!("{} -> {}: {}", file(a).display(), file(b).display(), names.join(", "))
-                })
-            });
-            circles.push(Circle { ties: ties.collect() });
-        }
-        circles
+        circles(&self.ties(), |file| Some(file.to_owned()))
     }
+
+    /// Groups of folders beside each other whose files import each other in a circle, also through files that stand beside the folders.
+    pub fn circles_of_folders(&self) -> Vec<Circle> {
+        let folders: BTreeSet<&Path> = self.0.values().flat_map(|s| s.file.ancestors().skip(1)).collect();
+        let ties = self.ties();
+        let within =
+            |folder: &Path| circles(&ties, |file| Some(folder.join(file.strip_prefix(folder).ok()?.iter().next()?)));
+        let rooms = folders.into_iter().filter(|f| !f.as_os_str().is_empty());
+        rooms.flat_map(within).filter(|circle| circle.entries.iter().any(|e| e.extension().is_none())).collect()
+    }
+}
+
+/// Groups that import each other in a circle; `group` says to which a file belongs.
+fn circles(ties: &[Tie], group: impl Fn(&Path) -> Option<PathBuf>) -> Vec<Circle> {
+    let mut graph: BTreeMap<PathBuf, BTreeMap<PathBuf, Vec<String>>> = BTreeMap::new();
+    for Tie { from, to, names } in ties {
+        let (Some(own), Some(other)) = (group(from), group(to)) else { continue };
+        graph.entry(other.clone()).or_default();
+        let of = graph.entry(own.clone()).or_default();
+        if own != other {
+            of.entry(other).or_default().push(format!("{} -> {}: {names}", from.display(), to.display()));
+        }
+    }
+    let reached = |from: &PathBuf| {
+        let mut seen: BTreeSet<&PathBuf> = BTreeSet::new();
+        let mut open: Vec<&PathBuf> = graph[from].keys().collect();
+        while let Some(next) = open.pop() {
+            if seen.insert(next) {
+                open.extend(graph[next].keys());
+            }
+        }
+        seen
+    };
+    let reach: BTreeMap<&PathBuf, BTreeSet<&PathBuf>> = graph.keys().map(|group| (group, reached(group))).collect();
+    let mut circles: Vec<Circle> = Vec::new();
+    for start in graph.keys().filter(|group| reach[group].contains(group)) {
+        if circles.iter().any(|c| c.entries.contains(start)) {
+            continue;
+        }
+        let is_tied = |group: &&PathBuf| reach[start].contains(group) && reach[group].contains(start);
+        let entries: Vec<PathBuf> = graph.keys().filter(is_tied).cloned().collect();
+        let of = |own: &PathBuf| entries.iter().filter_map(|other| graph[own].get(other)).flatten().cloned().collect();
+        let ties = entries.iter().flat_map(|own| -> Vec<String> { of(own) }).collect();
+        circles.push(Circle { entries, ties });
+    }
+    circles
 }
