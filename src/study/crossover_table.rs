@@ -8,7 +8,7 @@ use super::crossover::{Study, StudyCell};
 use crate::assess::Ratio;
 use crate::identify::Estimator;
 use crate::output::comparison::ratio_text;
-use crate::output::report::page::page;
+use crate::output::report::page::frame::page;
 use crate::study::made_with::made_with;
 
 /// How to read the estimators, for both reports.

@@ -2,8 +2,8 @@
 
 use maud::{Markup, html};
 
-use super::findings::remedy;
-use super::words::{count, significant};
+use super::chapters::findings::remedy;
+use super::wording::words::{count, significant};
 use crate::output::parameter_words::MOST_NEXT;
 use crate::output::solution_json::{SolutionRecord, StatisticsRecord};
 use crate::output::verdict::{Trust, Verdict};

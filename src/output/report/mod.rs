@@ -1,48 +1,35 @@
 //! report.html: one self-contained page, made from the record in solution.json, with small pictures of images whose files are there.
 //!
-//! A new chapter is one function and one row in [`chapters`].
+//! In the order of the data: `wording` (names and numbers in words) and `page` (the frame of a page, figures and their files) -> `figures` (what is drawn) ->
+//! `chapters` -> the pages, this one, `poses_page` and `plan_page`.
+//!
+//! A new chapter is one function in `chapters/` and one row in [`chapters()`].
 
-mod bodies;
-mod coverage;
-mod describe;
-mod figure;
-mod figure_files;
-mod findings;
+mod chapters;
+mod figures;
 mod first_page;
-mod gallery;
-mod images;
-mod knowledge;
-mod many;
-mod maps;
 pub(crate) mod page;
-mod parameters;
 mod plan_page;
-mod plan_pictures;
-mod plots;
-mod pose_residuals;
 mod poses_page;
-mod scene;
-mod sections;
-pub(crate) mod svg;
-mod thumbnails;
-mod two_stage;
-mod words;
+mod wording;
 
-pub use figure_files::FigureFile;
+pub use figures::thumbnails::{Shown, Thumbnail, Thumbnails};
+pub use page::figure_files::FigureFile;
 pub use plan_page::{plan_html, sigma_text};
 pub use poses_page::poses_html;
-pub use thumbnails::{Shown, Thumbnail, Thumbnails};
 
 use crate::output::solution_json::SolutionRecord;
 use crate::output::verdict::Verdict;
-use page::{Chapter, page_of_chapters};
-use words::count;
+use chapters::{
+    bodies, coverage, findings, gallery, images, knowledge, parameters, pose_residuals, sections, two_stage,
+};
+use figures::scene;
+use page::figure_files;
+use page::frame::{Chapter, SCRIPT, STYLE, page_of_chapters};
+use wording::words::count;
 
 /// Name of the report.
 pub const FILE_NAME: &str = "report.html";
-
-const STYLE: &str = include_str!("style.css");
-const SCRIPT: &str = include_str!("report.js");
 
 /// The page.
 pub fn report_html(record: &SolutionRecord, pictures: &Thumbnails) -> String {

@@ -2,10 +2,9 @@
 
 use maud::{Markup, html};
 
-use super::STYLE;
-use super::figure::figure;
-use super::page::page;
-use super::plan_pictures::{View, coverage, curve, joint_ranges, scene};
+use super::figures::plan_pictures::{View, coverage, curve, joint_ranges, scene};
+use super::page::figure::figure;
+use super::page::frame::{STYLE, page};
 use crate::output::plan_files::written;
 use crate::plan::{Forecast, Plan, PlanRequest, image_name};
 

@@ -2,11 +2,13 @@
 
 use maud::{Markup, html};
 
+use super::chapters::{coverage, findings, gallery, images, parameters, pose_residuals, sections};
+use super::figures::scene;
+use super::figures::thumbnails::Thumbnails;
 use super::first_page::{images_used, judged};
-use super::page::{Chapter, page_of_chapters};
-use super::thumbnails::Thumbnails;
-use super::words::{count, fixed, significant};
-use super::{SCRIPT, STYLE, coverage, findings, gallery, images, many, parameters, pose_residuals, scene, sections};
+use super::page::frame::{Chapter, SCRIPT, STYLE, page_of_chapters};
+use super::wording::many;
+use super::wording::words::{count, fixed, significant};
 use crate::error::Code;
 use crate::identify::{PoseComparison, PoseDifference};
 use crate::output::poses_record::{PosesRecord, usual, worst};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::{Claim, Section};
-use crate::output::report::svg::{Anchor, Svg};
+use crate::output::report::page::svg::{Anchor, Svg};
 use crate::plan::plate_design::LEAST_MINOR_AXIS_PX;
 use crate::study::image_stage::{Appearance, DISPLACED_PX, DISPLACED_SIGMAS, Identity, IdentityView, MirrorAnswer};
 

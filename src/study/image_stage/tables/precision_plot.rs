@@ -1,6 +1,6 @@
 //! Plot of the study of precision: what was reached over the exact bound.
 
-use crate::output::report::svg::{Anchor, Svg};
+use crate::output::report::page::svg::{Anchor, Svg};
 use crate::study::image_stage::Precision;
 
 const STYLE: &str = "text{font:11px sans-serif;fill:#222}.axis{stroke:#444}.grid{stroke:#ddd}.bound{stroke:#444}\

@@ -41,7 +41,7 @@ pub struct Thumbnail {
 
 /// Small pictures by the index of their image in the record.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Thumbnails(pub(super) BTreeMap<usize, Thumbnail>);
+pub struct Thumbnails(pub(in crate::output::report) BTreeMap<usize, Thumbnail>);
 
 impl Thumbnails {
     /// Those of the images that the report shows. An image whose file is not there any more, or is another, has none.
@@ -52,7 +52,7 @@ impl Thumbnails {
 }
 
 /// Images that are worth a look, by their index.
-pub(super) fn shown(record: Photogrammetry) -> Vec<(usize, Shown)> {
+pub(in crate::output::report) fn shown(record: Photogrammetry) -> Vec<(usize, Shown)> {
     let images = || record.images.iter().enumerate();
     let mut used: Vec<(usize, f64)> = images().filter_map(|(k, i)| Some((k, i.rms_px?))).collect();
     used.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -104,7 +104,7 @@ fn jpeg(picture: &Picture) -> Option<Vec<u8>> {
 }
 
 /// `data:` address of a JPEG.
-pub(super) fn data_uri(jpeg: &[u8]) -> String {
+pub(in crate::output::report) fn data_uri(jpeg: &[u8]) -> String {
     format!("data:image/jpeg;base64,{}", base64(jpeg))
 }
 

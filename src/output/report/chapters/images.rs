@@ -2,17 +2,17 @@
 
 use maud::{Markup, html};
 
-use super::figure::pointed;
-use super::many;
-use super::plots;
-use super::words::{axes_mm, fixed};
 use crate::identify::PoseSigma;
 use crate::output::photogrammetry::Photogrammetry;
 use crate::output::poses_record::PosesRecord;
+use crate::output::report::figures::plots;
+use crate::output::report::page::figure::pointed;
+use crate::output::report::wording::many;
+use crate::output::report::wording::words::{axes_mm, fixed};
 use crate::output::solution_json::{ImageRecord, SolutionRecord};
 
 /// One row for each image: what it contributed, how well it is predicted, why it was left out.
-pub(super) fn table(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn table(r: &SolutionRecord) -> Markup {
     if r.images.is_empty() {
         return html! {};
     }
@@ -35,7 +35,7 @@ pub(super) fn table(r: &SolutionRecord) -> Markup {
 }
 
 /// One row for each image: what it contributed, how well its pose is known, why it was left out.
-pub(super) fn of_poses(r: &PosesRecord) -> Markup {
+pub(in crate::output::report) fn of_poses(r: &PosesRecord) -> Markup {
     let mut known: Vec<Option<&PoseSigma>> = vec![None; r.images.len()];
     r.known.iter().for_each(|sigma| known[sigma.image] = Some(sigma));
     let sigmas: Vec<Option<f64>> = known.iter().map(|k| k.map(|s| s.position_m)).collect();

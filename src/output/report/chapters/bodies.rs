@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::words::{count, significant};
+use crate::output::report::wording::words::{count, significant};
 use crate::output::solution::bodies_record::{BodiesRecord, MeasurementRecord};
 use crate::output::solution_json::SolutionRecord;
 use crate::problem::InstrumentKind;
@@ -11,7 +11,7 @@ use crate::problem::InstrumentKind;
 const WORST: usize = 12;
 
 /// Tables of frames, of distances and of the worst measurements; nothing without such measurements.
-pub(super) fn section(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn section(r: &SolutionRecord) -> Markup {
     let b = &r.bodies;
     if b.is_empty() {
         return html! {};

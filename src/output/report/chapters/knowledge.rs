@@ -2,20 +2,20 @@
 
 use maud::{Markup, html};
 
-use super::figure::figure;
-use super::maps;
-use super::svg::{Anchor, Svg};
-use super::words::{count, data, significant};
 use crate::assess::{Cause, UnknownDirection};
 use crate::linalg::median;
 use crate::output::parameter_words::direction;
+use crate::output::report::figures::maps;
+use crate::output::report::page::figure::figure;
+use crate::output::report::page::svg::{Anchor, Svg};
+use crate::output::report::wording::words::{count, data, significant};
 use crate::output::solution_json::SolutionRecord;
 
 /// Most correlations that are listed.
 const MOST_PAIRS: usize = 20;
 
 /// Rank, directions that stay unknown, observability indices, what to measure next.
-pub(super) fn identifiable(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn identifiable(r: &SolutionRecord) -> Markup {
     let Some(found) = &r.identifiability else { return html! {} };
     let of = |causes: &'static [Cause]| found.unknown.iter().filter(move |d| causes.contains(&d.cause));
     html! {
@@ -82,7 +82,7 @@ fn group<'a>(what: &str, directions: impl Iterator<Item = &'a UnknownDirection>)
 const CLASSES: [&str; 5] = ["m1", "m2", "m3", "m4", "m5"];
 
 /// Sigma of the flange over the workspace.
-pub(super) fn workspace(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn workspace(r: &SolutionRecord) -> Markup {
     if r.workspace.is_empty() {
         return html! {};
     }

@@ -6,13 +6,13 @@ use std::fmt::Write as _;
 use maud::{Markup, PreEscaped, html};
 use nalgebra::{Vector2, Vector3};
 
-use super::describe::describe;
-use super::many;
-use super::svg::escaped;
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::Robot;
 use crate::output::photogrammetry::Photogrammetry;
+use crate::output::report::page::svg::escaped;
+use crate::output::report::wording::describe::describe;
+use crate::output::report::wording::many;
 use crate::output::restore::{camera, found_model};
 use crate::output::solution_json::{ImageRecord, PlateRecord, SolutionRecord};
 use crate::series::CameraMount;
@@ -183,7 +183,7 @@ struct Words<'a> {
 }
 
 /// The chapter of a robot.
-pub(super) fn section(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn section(r: &SolutionRecord) -> Markup {
     let Some(scene) = Scene::of(r) else { return html! {} };
     let label = format!("Arm, {} camera poses, plate and region of the stops", scene.cameras.len());
     html! {
@@ -196,7 +196,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
 }
 
 /// The chapter of images alone: each plate with the cameras that saw it.
-pub(super) fn of_plates(p: Photogrammetry) -> Markup {
+pub(in crate::output::report) fn of_plates(p: Photogrammetry) -> Markup {
     let scenes: Vec<(&str, Scene)> = p
         .plates
         .iter()

@@ -3,11 +3,11 @@
 use maud::{Markup, PreEscaped, html};
 
 /// A figure with its caption.
-pub(super) fn figure(svg: &str, caption: &str) -> Markup {
+pub(in crate::output::report) fn figure(svg: &str, caption: &str) -> Markup {
     html! { figure { (PreEscaped(svg)) figcaption { (caption) } } }
 }
 
 /// A figure whose parts say what they are when one points at them or touches them.
-pub(super) fn pointed(svg: &str, caption: &str) -> Markup {
+pub(in crate::output::report) fn pointed(svg: &str, caption: &str) -> Markup {
     html! { figure { (PreEscaped(svg)) output aria-live="polite" {} figcaption { (caption) } } }
 }

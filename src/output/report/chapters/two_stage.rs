@@ -2,14 +2,14 @@
 
 use maud::{Markup, html};
 
-use super::figure::figure;
-use super::svg::{Anchor, Svg, round_below};
-use super::words::{count, fixed, significant};
 use crate::identify::{Comparison, Estimator};
+use crate::output::report::page::figure::figure;
+use crate::output::report::page::svg::{Anchor, Svg, round_below};
+use crate::output::report::wording::words::{count, fixed, significant};
 use crate::output::solution_json::SolutionRecord;
 
 /// What a fit of the robot to stand-alone camera poses would have reached.
-pub(super) fn section(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn section(r: &SolutionRecord) -> Markup {
     let Some(comparison) = &r.two_stage else { return html! {} };
     html! {
         p {

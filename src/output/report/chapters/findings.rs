@@ -6,7 +6,7 @@ use crate::error::Notice;
 use crate::output::verdict::{Trust, Verdict, VerdictReason};
 
 /// Failed gates, then notes: doubts are some of them.
-pub(super) fn section(v: &Verdict, notices: &[Notice]) -> Markup {
+pub(in crate::output::report) fn section(v: &Verdict, notices: &[Notice]) -> Markup {
     html! {
         @match v.trust {
             Trust::Good => p { "Every check passed." },
@@ -30,7 +30,7 @@ fn list(reasons: &[VerdictReason]) -> Markup {
 }
 
 /// On a line of its own; nothing where none is known.
-pub(super) fn remedy(words: &str) -> Markup {
+pub(in crate::output::report) fn remedy(words: &str) -> Markup {
     html! { @if !words.is_empty() { br; span.note { "→ " (words) } } }
 }
 

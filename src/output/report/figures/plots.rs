@@ -1,10 +1,10 @@
 //! Plots of numbers: histogram of held-out errors, joint noise.
 
-use super::describe::describe;
-use super::many;
-use super::svg::{Anchor, Svg, ticks};
-use super::words::plain;
 use crate::output::photogrammetry::Photogrammetry;
+use crate::output::report::page::svg::{Anchor, Svg, ticks};
+use crate::output::report::wording::describe::describe;
+use crate::output::report::wording::many;
+use crate::output::report::wording::words::plain;
 use crate::output::solution_json::SolutionRecord;
 use crate::urdf::JointKind;
 
@@ -57,7 +57,7 @@ impl Axis {
 }
 
 /// Held-out error of every image before and after.
-pub(super) fn histogram(record: &SolutionRecord) -> Option<String> {
+pub(in crate::output::report) fn histogram(record: &SolutionRecord) -> Option<String> {
     let errors: Vec<[f64; 2]> = record.images.iter().filter_map(|i| i.held_out_mm).collect();
     if errors.is_empty() {
         return None;
@@ -101,7 +101,7 @@ pub(super) fn histogram(record: &SolutionRecord) -> Option<String> {
 }
 
 /// Residuals of every image in use, a bar each in the order of the series; left-out images are marked at the foot. With the number of bars.
-pub(super) fn by_image(record: Photogrammetry) -> Option<(String, usize)> {
+pub(in crate::output::report) fn by_image(record: Photogrammetry) -> Option<(String, usize)> {
     let most = record.images.iter().filter_map(|i| i.rms_px).fold(0.0, f64::max);
     if most <= 0.0 {
         return None;
@@ -132,7 +132,7 @@ pub(super) fn by_image(record: Photogrammetry) -> Option<(String, usize)> {
 }
 
 /// Joint noise in thousandths of a degree (of a millimetre for a prismatic joint), a bar for each joint and series.
-pub(super) fn joint_noise(record: &SolutionRecord) -> Option<String> {
+pub(in crate::output::report) fn joint_noise(record: &SolutionRecord) -> Option<String> {
     let all = record.stop_noise();
     let names = &record.robot.readings;
     let shown = |k: usize, sigma: f64| match record.robot.reading_kinds[k] {

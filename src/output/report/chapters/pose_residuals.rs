@@ -4,13 +4,13 @@
 use maud::{Markup, html};
 use nalgebra::Vector6;
 
-use super::describe::name;
-use super::figure::pointed;
-use super::many;
-use super::svg::{Anchor, Svg, round_below};
-use super::words::plain;
 use crate::geom::Pose;
 use crate::model::robot::Posture;
+use crate::output::report::page::figure::pointed;
+use crate::output::report::page::svg::{Anchor, Svg, round_below};
+use crate::output::report::wording::describe::name;
+use crate::output::report::wording::many;
+use crate::output::report::wording::words::plain;
 use crate::output::restore::found_model;
 use crate::output::solution_json::{ImageRecord, SolutionRecord};
 
@@ -52,7 +52,7 @@ fn residuals(r: &SolutionRecord) -> Option<Vec<PoseResidual<'_>>> {
 }
 
 /// The chapter; empty for series without images.
-pub(super) fn section(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn section(r: &SolutionRecord) -> Markup {
     let Some(all) = residuals(r).filter(|all| all.len() >= FEWEST_IMAGES) else { return html! {} };
     let of_all = all.len();
     let shown = many::drawn(all);
@@ -86,7 +86,7 @@ fn of_axes(
 }
 
 /// Twists (m, rad) by the name of their image, in the order of the series.
-pub(super) fn course(shown: &[(String, Vector6<f64>)], label: &str, caption: &str) -> Markup {
+pub(in crate::output::report) fn course(shown: &[(String, Vector6<f64>)], label: &str, caption: &str) -> Markup {
     let height = TOP + 2.0 * PANEL + GAP + BOTTOM;
     let mut svg = Svg::new(WIDTH, height, label);
     for (k, class) in ["x", "y", "z"].into_iter().enumerate() {

@@ -2,9 +2,9 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::svg::{Anchor, Svg};
-use super::words::plain;
 use crate::geom::Pose;
+use crate::output::report::page::svg::{Anchor, Svg};
+use crate::output::report::wording::words::plain;
 use crate::plan::visibility::seen_markers;
 use crate::plan::{Forecast, JointRange, Plan, PlanRequest};
 use crate::series::CameraMount;
@@ -15,7 +15,7 @@ const MARGIN: f64 = 30.0;
 
 /// Side of a drawing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum View {
+pub(in crate::output::report) enum View {
     /// Along y: x to the right, z up.
     Side,
     /// Along -z: x to the right, y up.
@@ -38,7 +38,7 @@ const CONE: f64 = 0.35;
 type Segment = ([f64; 2], [f64; 2], &'static str);
 
 /// Arm, views and plates of all stops.
-pub(super) fn scene(request: &PlanRequest, plan: &Plan, view: View) -> String {
+pub(in crate::output::report) fn scene(request: &PlanRequest, plan: &Plan, view: View) -> String {
     let setting = &request.setting;
     let mut segments: Vec<Segment> = Vec::new();
     let mut add = |a: &Vector3<f64>, b: &Vector3<f64>, class| segments.push((view.flat(a), view.flat(b), class));
@@ -119,7 +119,7 @@ fn drawn(segments: &[Segment], view: View) -> String {
 const CELLS: [usize; 2] = [20, 16];
 
 /// Where in the image the markers of all planned images lie.
-pub(super) fn coverage(request: &PlanRequest, plan: &Plan) -> String {
+pub(in crate::output::report) fn coverage(request: &PlanRequest, plan: &Plan) -> String {
     let setting = &request.setting;
     let camera = &setting.camera;
     let size = [f64::from(camera.width_px), f64::from(camera.height_px)];
@@ -157,7 +157,7 @@ const LONGEST_NAME: usize = 24;
 const LETTER: f64 = 7.0;
 
 /// Limits and planned readings of every joint.
-pub(super) fn joint_ranges(forecast: &Forecast) -> String {
+pub(in crate::output::report) fn joint_ranges(forecast: &Forecast) -> String {
     let name = |range: &JointRange| range.name.chars().take(LONGEST_NAME).collect::<String>();
     let longest = forecast.ranges.iter().map(|r| name(r).len()).max().unwrap_or(0);
     let (left, row) = (16.0 + LETTER * longest as f64, 36.0);
@@ -182,7 +182,7 @@ pub(super) fn joint_ranges(forecast: &Forecast) -> String {
 }
 
 /// Error over the number of images, both axes logarithmic.
-pub(super) fn curve(forecast: &Forecast) -> String {
+pub(in crate::output::report) fn curve(forecast: &Forecast) -> String {
     let (height, left, bottom) = (260.0, 56.0, 40.0);
     let mut svg = Svg::new(WIDTH, height, "Expected error of the flange over the number of images");
     let points = &forecast.curve;

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
-use super::figure::figure;
-use super::maps;
-use super::words::{fixed, is_local, parameter, plus_minus, short, significant, unit};
 use crate::geom::Pose;
 use crate::output::parameter_words::{grouped, split};
 use crate::output::photogrammetry::Photogrammetry;
+use crate::output::report::figures::maps;
+use crate::output::report::page::figure::figure;
+use crate::output::report::wording::words::{fixed, is_local, parameter, plus_minus, short, significant, unit};
 use crate::output::solution_json::{EstimateRecord, PlacedRecord, SolutionRecord};
 use crate::series::CameraMount;
 
@@ -17,7 +17,7 @@ use crate::series::CameraMount;
 const MOST_CORRECTIONS: usize = 12;
 
 /// Corrections of the robot.
-pub(super) fn robot(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn robot(r: &SolutionRecord) -> Markup {
     let strongest = strongest(r);
     html! {
         h3 { "The corrections that are surest to be real" }
@@ -145,7 +145,7 @@ fn cell(r: &SolutionRecord, e: &EstimateRecord, head: &EstimateRecord) -> Markup
 }
 
 /// What the data do not determine, and what they cannot tell apart.
-pub(super) fn undetermined(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn undetermined(r: &SolutionRecord) -> Markup {
     let weak: Vec<&str> = r.undetermined().iter().map(|e| e.name.as_str()).collect();
     let others = || r.estimates.iter().filter(|e| e.free && !e.name.starts_with("robot/"));
     let silent: Vec<&str> = others().filter(|e| r.hardly_determines(e)).map(|e| e.name.as_str()).collect();
@@ -167,7 +167,7 @@ pub(super) fn undetermined(r: &SolutionRecord) -> Markup {
 }
 
 /// Poses of cameras and plates.
-pub(super) fn placed(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn placed(r: &SolutionRecord) -> Markup {
     let fixed_camera = r.images.iter().any(|i| i.camera_mount == CameraMount::Fixed);
     let (camera, plate) = match fixed_camera {
         false => (&r.robot.tip, &r.robot.base),
@@ -213,7 +213,7 @@ fn is_of_formula(e: &EstimateRecord, camera: &str) -> bool {
 }
 
 /// Cameras: parameters, distortion and uncertainty.
-pub(super) fn cameras(r: Photogrammetry) -> Markup {
+pub(in crate::output::report) fn cameras(r: Photogrammetry) -> Markup {
     html! {
         @for (k, camera) in r.cameras.iter().enumerate() {
             h3 { (camera.name) ", " (camera.lens.name()) " lens, " (camera.width_px) " × " (camera.height_px) " px" }

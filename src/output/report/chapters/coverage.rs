@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 
 use maud::{Markup, html};
 
-use super::describe::name;
-use super::figure::pointed;
-use super::svg::{Anchor, Svg};
-use super::words::fixed;
 use crate::output::photogrammetry::Photogrammetry;
+use crate::output::report::page::figure::pointed;
+use crate::output::report::page::svg::{Anchor, Svg};
+use crate::output::report::wording::describe::name;
+use crate::output::report::wording::words::fixed;
 use crate::output::solution_json::{ImageRecord, SolutionRecord};
 use crate::urdf::JointKind;
 
@@ -21,7 +21,7 @@ const COLUMNS: usize = 20;
 const SEEN_EVERYWHERE: &str = "Markers should have been seen everywhere in the image, the corners too.";
 
 /// Both.
-pub(super) fn section(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn section(r: &SolutionRecord) -> Markup {
     html! {
         p {
             "Each dot is the reading of a joint at a stop, within the limits of the joint. What no stop covered is extrapolated. "
@@ -33,7 +33,7 @@ pub(super) fn section(r: &SolutionRecord) -> Markup {
 }
 
 /// That of images alone.
-pub(super) fn of_images(p: Photogrammetry) -> Markup {
+pub(in crate::output::report) fn of_images(p: Photogrammetry) -> Markup {
     html! {
         p { (SEEN_EVERYWHERE) }
         (fields(p))

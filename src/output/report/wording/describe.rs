@@ -7,7 +7,7 @@ use crate::output::solution_json::{ImageRecord, RobotRecord};
 use crate::urdf::JointKind;
 
 /// Name, pose of the camera towards the plate, joint readings, residual or reason.
-pub(super) fn describe(p: Photogrammetry, image: &ImageRecord) -> String {
+pub(in crate::output::report) fn describe(p: Photogrammetry, image: &ImageRecord) -> String {
     let mut parts = vec![name(p, image)];
     parts.extend(image.camera_from_plate.as_ref().map(|plate| pose(&Pose::from(plate))));
     parts.extend(p.robot.zip(image.readings.as_ref()).map(|(robot, q)| readings(robot, q)));
@@ -20,7 +20,7 @@ pub(super) fn describe(p: Photogrammetry, image: &ImageRecord) -> String {
 }
 
 /// The name, with that of the series where there are several.
-pub(super) fn name(p: Photogrammetry, image: &ImageRecord) -> String {
+pub(in crate::output::report) fn name(p: Photogrammetry, image: &ImageRecord) -> String {
     if p.series.len() > 1 { format!("{} ({})", image.name, image.series) } else { image.name.clone() }
 }
 

@@ -2,6 +2,11 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+/// Style of the reports.
+pub const STYLE: &str = include_str!("style.css");
+/// Their script: it says what is pointed at, and turns the scene.
+pub const SCRIPT: &str = include_str!("report.js");
+
 /// Nothing is fetched, whatever stands in the page.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 

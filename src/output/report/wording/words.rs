@@ -4,12 +4,12 @@ use crate::output::parameter_words::{LOCAL, split};
 use crate::output::solution_json::{EstimateRecord, SolutionRecord};
 
 /// True for the local error of a joint near a reading: noise of the series, no property of the robot.
-pub(super) fn is_local(name: &str) -> bool {
+pub(in crate::output::report) fn is_local(name: &str) -> bool {
     name.starts_with("robot/") && name.contains(LOCAL)
 }
 
 /// Name of a parameter in words: `robot/joint_3/origin.rx` -> "joint_3 origin, rotation about x".
-pub(super) fn parameter(name: &str) -> String {
+pub(in crate::output::report) fn parameter(name: &str) -> String {
     let (block, component) = split(name);
     let part = component_words(component);
     let mut levels = block.splitn(2, '/');
@@ -49,7 +49,7 @@ fn component_words(component: &str) -> String {
 }
 
 /// Short name of a component, for heads of tables and lists: `cos_2` -> "cos 2q".
-pub(super) fn short(component: &str) -> String {
+pub(in crate::output::report) fn short(component: &str) -> String {
     match component.split_once('_') {
         Some((wave @ ("cos" | "sin"), "1")) => format!("{wave} q"),
         Some((wave @ ("cos" | "sin"), k)) => format!("{wave} {k}q"),
@@ -59,7 +59,7 @@ pub(super) fn short(component: &str) -> String {
 }
 
 /// Factor from SI to the unit for people, and that unit.
-pub(super) fn unit(e: &EstimateRecord) -> (f64, &'static str) {
+pub(in crate::output::report) fn unit(e: &EstimateRecord) -> (f64, &'static str) {
     let small = e.prior_sigma.is_some_and(|s| s < 1e-3);
     match (e.unit.as_str(), small) {
         ("m", _) => (1e3, "mm"),
@@ -81,7 +81,7 @@ fn decimals(sigma: f64) -> usize {
 }
 
 /// "0.412 ± 0.035", both with as many decimals as sigma deserves.
-pub(super) fn plus_minus(value: f64, sigma: f64) -> String {
+pub(in crate::output::report) fn plus_minus(value: f64, sigma: f64) -> String {
     let d = decimals(sigma);
     format!("{} ± {sigma:.d$}", minus(&format!("{value:.d$}")))
 }
@@ -96,12 +96,12 @@ fn minus(number: &str) -> String {
 }
 
 /// A number with a fixed number of decimals.
-pub(super) fn fixed(value: f64, decimals: usize) -> String {
+pub(in crate::output::report) fn fixed(value: f64, decimals: usize) -> String {
     minus(&format!("{value:.decimals$}"))
 }
 
 /// A positive number with three significant digits.
-pub(super) fn significant(value: f64) -> String {
+pub(in crate::output::report) fn significant(value: f64) -> String {
     if !value.is_finite() {
         return "–".into();
     }
@@ -113,7 +113,7 @@ pub(super) fn significant(value: f64) -> String {
 }
 
 /// A scale as few characters: 0.5, 20.
-pub(super) fn plain(value: f64) -> String {
+pub(in crate::output::report) fn plain(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
     }
@@ -124,12 +124,12 @@ pub(super) fn plain(value: f64) -> String {
 }
 
 /// Semi-axes of an ellipsoid, mm.
-pub(super) fn axes_mm(all: &[f64; 3]) -> String {
+pub(in crate::output::report) fn axes_mm(all: &[f64; 3]) -> String {
     all.map(|a| fixed(1e3 * a, 4)).join(" ")
 }
 
 /// "2nd", "11th".
-pub(super) fn ordinal(n: usize) -> String {
+pub(in crate::output::report) fn ordinal(n: usize) -> String {
     let ending = match (n % 10, n % 100) {
         (_, 11..=13) => "th",
         (1, _) => "st",
@@ -141,12 +141,12 @@ pub(super) fn ordinal(n: usize) -> String {
 }
 
 /// What the data are, in the plural.
-pub(super) fn data(r: &SolutionRecord) -> &'static str {
+pub(in crate::output::report) fn data(r: &SolutionRecord) -> &'static str {
     if r.images.is_empty() { "measurements" } else { "images" }
 }
 
 /// "1 image", "3 images".
-pub(super) fn count(n: usize, what: &str) -> String {
+pub(in crate::output::report) fn count(n: usize, what: &str) -> String {
     if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }
 

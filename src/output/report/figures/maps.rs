@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-use super::svg::{Anchor, Svg, round_below};
-use super::words::{ordinal, plain};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::output::photogrammetry::Photogrammetry;
+use crate::output::report::page::svg::{Anchor, Svg, round_below};
+use crate::output::report::wording::words::{ordinal, plain};
 use crate::output::restore::camera;
 use crate::output::solution_json::{CameraRecord, ImageRecord, PlateRecord};
 
@@ -21,7 +21,7 @@ const LEGEND: f64 = 34.0;
 const MOST_VECTORS: usize = 4000;
 
 /// A drawn map with what it needs to be said under it.
-pub(super) struct Map {
+pub(in crate::output::report) struct Map {
     /// The drawing.
     pub svg: String,
     /// Scale and selection, in words.
@@ -38,7 +38,7 @@ fn rms(arrows: &[Arrow]) -> f64 {
 }
 
 /// The rectangle of a map and how it lies on the paper.
-pub(super) struct Field {
+pub(in crate::output::report) struct Field {
     pub low: [f64; 2],
     pub high: [f64; 2],
     /// True where the second coordinate grows upwards.
@@ -100,7 +100,7 @@ fn used(image: &ImageRecord) -> impl Iterator<Item = (usize, [f64; 2])> + '_ {
 }
 
 /// Residuals of all images of a camera over its field.
-pub(super) fn residuals_over_image(record: Photogrammetry, camera: usize) -> Option<Map> {
+pub(in crate::output::report) fn residuals_over_image(record: Photogrammetry, camera: usize) -> Option<Map> {
     let c = &record.cameras[camera];
     let images = record.images.iter().filter(|i| i.camera == camera);
     let arrows: Vec<Arrow> = images.flat_map(|i| used(i).map(|(k, d)| (i.observations.uv[k], d))).collect();
@@ -115,7 +115,7 @@ pub(super) fn residuals_over_image(record: Photogrammetry, camera: usize) -> Opt
 }
 
 /// Mean residual of every marker, carried back to the plate, mm.
-pub(super) fn residuals_over_plate(record: Photogrammetry, plate: usize) -> Option<Map> {
+pub(in crate::output::report) fn residuals_over_plate(record: Photogrammetry, plate: usize) -> Option<Map> {
     let p = &record.plates[plate];
     let mut sums = vec![(Vector2::zeros(), 0.0); p.id.len()];
     for image in record.images.iter().filter(|i| i.plate == plate) {
@@ -141,7 +141,7 @@ pub(super) fn residuals_over_plate(record: Photogrammetry, plate: usize) -> Opti
 }
 
 /// Correction of every marker against nominal: arrows in the plane, circles for the height.
-pub(super) fn plate_corrections(record: Photogrammetry, plate: usize) -> Option<Map> {
+pub(in crate::output::report) fn plate_corrections(record: Photogrammetry, plate: usize) -> Option<Map> {
     let p = &record.plates[plate];
     let difference = |m: usize| Vector3::from(p.position_m[m]) - Vector3::from(p.nominal_m[m]);
     let arrows: Vec<Arrow> =
@@ -167,7 +167,7 @@ pub(super) fn plate_corrections(record: Photogrammetry, plate: usize) -> Option<
 }
 
 /// What the lens does to the image: from where a pinhole camera would see a point to where this one does.
-pub(super) fn distortion(camera_record: &CameraRecord) -> Option<Map> {
+pub(in crate::output::report) fn distortion(camera_record: &CameraRecord) -> Option<Map> {
     let camera = camera(camera_record);
     let mut plain = camera.clone();
     plain.parameters[4..].iter_mut().for_each(|p| *p = 0.0);
@@ -202,7 +202,7 @@ pub(super) fn distortion(camera_record: &CameraRecord) -> Option<Map> {
 const SIGMA_BOUNDS_PX: [f64; 4] = [0.02, 0.05, 0.1, 0.3];
 
 /// How well it is known where in the image a direction shows.
-pub(super) fn uncertainty(r: Photogrammetry, camera: usize) -> Option<Map> {
+pub(in crate::output::report) fn uncertainty(r: Photogrammetry, camera: usize) -> Option<Map> {
     let c = &r.cameras[camera];
     let map = c.projection.as_ref()?;
     let [seen, largest] = c.projection_known(r.seen_by(camera).map(|(uv, _)| uv))?;

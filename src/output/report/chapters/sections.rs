@@ -2,15 +2,16 @@
 
 use maud::{Markup, PreEscaped, html};
 
-use super::figure::figure;
-use super::words::{count, data, plus_minus, significant, unit};
-use super::{many, maps, plots};
 use crate::identify::StartReached;
 use crate::output::photogrammetry::Photogrammetry;
+use crate::output::report::figures::{maps, plots};
+use crate::output::report::page::figure::figure;
+use crate::output::report::wording::many;
+use crate::output::report::wording::words::{count, data, plus_minus, significant, unit};
 use crate::output::solution_json::SolutionRecord;
 
 /// Before and after on held-out images.
-pub(super) fn accuracy(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn accuracy(r: &SolutionRecord) -> Markup {
     let are_images = !r.images.is_empty();
     let rows = [("Nominal robot", &r.accuracy.nominal), ("Calibrated robot", &r.accuracy.calibrated)];
     html! {
@@ -45,7 +46,7 @@ pub(super) fn accuracy(r: &SolutionRecord) -> Markup {
 }
 
 /// What was read, what was left out and why, and what else should be known.
-pub(super) fn left_out(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn left_out(r: &SolutionRecord) -> Markup {
     if r.images.is_empty() {
         return html! { p { (r.bodies.left_out()) " of " (count(r.bodies.measurements.len(), "measurement")) " left out." } };
     }
@@ -53,7 +54,7 @@ pub(super) fn left_out(r: &SolutionRecord) -> Markup {
 }
 
 /// The same of images.
-pub(super) fn images_left_out(r: Photogrammetry) -> Markup {
+pub(in crate::output::report) fn images_left_out(r: Photogrammetry) -> Markup {
     let mut series: Vec<&str> = Vec::new();
     r.images.iter().for_each(|i| {
         if !series.contains(&i.series.as_str()) {
@@ -94,7 +95,7 @@ fn series_row(r: Photogrammetry, name: &str) -> Markup {
 }
 
 /// How well each joint repeats its reading.
-pub(super) fn joint_noise(r: &SolutionRecord) -> Markup {
+pub(in crate::output::report) fn joint_noise(r: &SolutionRecord) -> Markup {
     html! {
         p {
             "How far a joint typically stands from where its reading and the model say (one sigma), as the " (data(r)) " show it. "
@@ -108,7 +109,7 @@ pub(super) fn joint_noise(r: &SolutionRecord) -> Markup {
 }
 
 /// Residual maps.
-pub(super) fn residuals(r: Photogrammetry) -> Markup {
+pub(in crate::output::report) fn residuals(r: Photogrammetry) -> Markup {
     if r.images.is_empty() {
         return html! {};
     }
@@ -133,12 +134,12 @@ pub(super) fn residuals(r: Photogrammetry) -> Markup {
 }
 
 /// " of run1" where there are several plates.
-pub(super) fn of_several(r: Photogrammetry, plate: &str) -> String {
+pub(in crate::output::report) fn of_several(r: Photogrammetry, plate: &str) -> String {
     if r.plates.len() > 1 { format!(" of {plate}") } else { String::new() }
 }
 
 /// The plates as found.
-pub(super) fn plates(r: Photogrammetry) -> Markup {
+pub(in crate::output::report) fn plates(r: Photogrammetry) -> Markup {
     if r.plates.is_empty() {
         return html! {};
     }
@@ -155,7 +156,7 @@ pub(super) fn plates(r: Photogrammetry) -> Markup {
                 tbody { @for e in modes { @if let (Some(value), Some(sigma)) = (e.value, e.sigma) {
                     @let (factor, unit) = unit(e);
                     tr {
-                        td { (super::words::parameter(&e.name)) }
+                        td { (crate::output::report::wording::words::parameter(&e.name)) }
                         td.n { (plus_minus(factor * value, factor * sigma)) } td { (unit) }
                         td.n { @if let Some(p) = e.prior_sigma { (significant(factor * p)) } }
                         td.n { @if let Some(s) = e.share_of_data { (format!("{:.0} %", 100.0 * s)) } }
@@ -172,7 +173,7 @@ pub(super) fn plates(r: Photogrammetry) -> Markup {
 }
 
 /// Where the solution started.
-pub(super) fn starts(r: Photogrammetry) -> Markup {
+pub(in crate::output::report) fn starts(r: Photogrammetry) -> Markup {
     let tried = || r.starts.iter().filter(|s| s.reached != StartReached::NotNeeded);
     let spared = r.starts.len() - tried().count();
     html! {
@@ -191,7 +192,7 @@ pub(super) fn starts(r: Photogrammetry) -> Markup {
 }
 
 /// What is needed to repeat the result, behind what `ended` says of its end.
-pub(super) fn record(r: Photogrammetry, ended: &str) -> Markup {
+pub(in crate::output::report) fn record(r: Photogrammetry, ended: &str) -> Markup {
     let files = many::files(r);
     html! {
         p { code { (r.program.command) } }

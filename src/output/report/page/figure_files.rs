@@ -1,6 +1,6 @@
 //! The figures of the report as files of their own, for papers and pages.
 
-use super::page::Chapter;
+use super::frame::Chapter;
 
 /// A drawing as a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -12,7 +12,7 @@ pub struct FigureFile {
 }
 
 /// The drawings of some chapters, with what the style of their page says of drawings and colours.
-pub(super) fn drawn(chapters: &[Chapter], style: &str) -> Vec<FigureFile> {
+pub(in crate::output::report) fn drawn(chapters: &[Chapter], style: &str) -> Vec<FigureFile> {
     let of_chapter = |chapter: &Chapter| {
         let all = drawings(&chapter.body.0);
         let name = |k: usize| match all.len() {

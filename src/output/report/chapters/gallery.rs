@@ -4,17 +4,17 @@ use std::fmt::Write as _;
 
 use maud::{Markup, PreEscaped, html};
 
-use super::svg::escaped;
-use super::thumbnails::{Shown, Thumbnail, Thumbnails, data_uri, shown};
-use super::words::{count, fixed};
 use crate::output::photogrammetry::Photogrammetry;
+use crate::output::report::figures::thumbnails::{Shown, Thumbnail, Thumbnails, data_uri, shown};
+use crate::output::report::page::svg::escaped;
+use crate::output::report::wording::words::{count, fixed};
 use crate::output::solution_json::ImageRecord;
 
 /// Length of a typical residual as drawn, as a share of the width of the image.
 const RESIDUAL: f64 = 0.02;
 
 /// One figure an image; nothing where the files of the images are not there.
-pub(super) fn gallery(r: Photogrammetry, pictures: &Thumbnails) -> Markup {
+pub(in crate::output::report) fn gallery(r: Photogrammetry, pictures: &Thumbnails) -> Markup {
     if pictures.0.is_empty() {
         return html! {};
     }
@@ -39,7 +39,7 @@ pub(super) fn gallery(r: Photogrammetry, pictures: &Thumbnails) -> Markup {
 fn magnification(r: Photogrammetry) -> f64 {
     let width = r.images.first().and_then(|i| r.cameras.get(i.camera)).map_or(1000.0, |c| f64::from(c.width_px));
     let factor = RESIDUAL * width / r.statistics.rms_px.max(1e-6);
-    super::svg::round_below(factor).max(1.0)
+    crate::output::report::page::svg::round_below(factor).max(1.0)
 }
 
 fn one(r: Photogrammetry, k: usize, picture: &Thumbnail, magnified: f64) -> Markup {
