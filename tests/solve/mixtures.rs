@@ -194,6 +194,10 @@ fn a_tracker_and_a_plate_that_contradict_each_other_are_named_once() {
             .filter(|f| f.fails() && [Code::LengthsContradicted, Code::PlateSizeContradicted].contains(&f.code()))
             .map(|f| (f.code(), f.quantities()[0].value))
             .collect();
+        // Stand-alone poses know of images alone.
+        let (images, together) = solution.poses_together().unwrap().unwrap();
+        assert!(images.len() > STOPS - 3);
+        assert_eq!(together.shape(), (6 * images.len(), 6 * images.len()));
         match said[..] {
             [] => assert_eq!(factor, 1.0),
             [(Code::LengthsContradicted, off)] => assert!((off - (factor - 1.0)).abs() < 4e-3, "{factor}: {off}"),

@@ -76,7 +76,7 @@ fn canonical_correlation(c: &Matrix6<f64>) -> f64 {
 /// Most images of which the covariance between poses is stated: the square of their number counts.
 const MOST_TOGETHER: usize = 400;
 
-/// Adjusts cameras, plates and free camera poses; readings are not looked at. The lens of a camera that its series leaves open is that
+/// Adjusts cameras, plates and free camera poses; readings, and what trackers and contacts measured, are not looked at. The lens of a camera that its series leaves open is that
 /// which predicts best what the adjustment had not seen.
 ///
 /// # Errors
@@ -84,7 +84,10 @@ const MOST_TOGETHER: usize = 400;
 pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAlone> {
     let chain = Chain::empty();
     let mut series = series.to_vec();
-    series.iter_mut().flat_map(|s| &mut s.stops).for_each(|stop| stop.readings = None);
+    for own in &mut series {
+        own.stops.iter_mut().for_each(|stop| stop.readings = None);
+        (own.bodies, own.lengths) = (Vec::new(), Vec::new());
+    }
     let open: Vec<String> = open_cameras(&series).into_keys().collect();
     series.iter_mut().filter(|s| open.contains(&s.camera)).for_each(|s| s.lens = Lens::ALL[0]);
     let by_first = adjusted(&series, limits);
