@@ -9,7 +9,7 @@ use crate::assess::{
 };
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Noise};
-use crate::solve::{Covariance, Fit, NoiseInformation, NoiseUncertainty, noise_information};
+use crate::solve::{Covariance, Fit, NoiseInformation, NoiseUncertainty, in_frame, noise_information};
 
 /// Sigmas of a 95 % interval.
 pub const NORMAL_95: f64 = 1.96;
@@ -19,6 +19,9 @@ pub const NORMAL_95: f64 = 1.96;
 pub struct Uncertainty {
     /// What the data tell; none without stops.
     pub identifiability: Option<Identifiability>,
+    /// Covariance of the dense columns with the plates in the frames of their nominal markers ([`in_frame`]): what the tolerance of the
+    /// markers leaves open of the frame of a plate is no error of the robot.
+    pub covariance: DMatrix<f64>,
     /// Sigmas of the dense columns by the noise model alone.
     pub model_sigma: Vec<f64>,
     /// Sigmas of the dense columns by clusters of images; none for too few images.
@@ -76,17 +79,41 @@ pub fn judge(
         }
         found.clustered_sigma = Some(by_clusters);
     }
-    let model = FlangeModel::of(adjustment, &covariance.reduced, limits);
+    let fit = &*fit;
+    found.covariance = with_plates_in_their_frames(fit);
+    found.take_frames_of_plates(&sigmas(&fit.covariance.reduced), &sigmas(&found.covariance));
+    let Adjustment { problem, state } = &fit.adjustment;
+    let stated = std::mem::take(&mut found.covariance);
+    let model = FlangeModel::of(&fit.adjustment, &stated, limits);
     let noise = usual_joint_sigma(&on_robot_sigmas(problem));
-    found.alone = model.as_ref().and_then(|m| urdf_alone(&state.robot, layout, &m.region()));
+    found.alone = model.as_ref().and_then(|m| urdf_alone(&state.robot, &problem.layout, &m.region()));
     let robots = (&state.robot, found.alone.as_ref());
     let promise = |m: &FlangeModel| FlangeErrors::new(m, robots, &noise, &stops);
     found.flange = model.as_ref().and_then(promise);
     found.workspace = model.map(|m| m.workspace()).unwrap_or_default();
+    found.covariance = stated;
     found
 }
 
+/// Covariance of the dense columns with the plates in their frames; as it is where no image defines one, or where a second stage has stated it.
+fn with_plates_in_their_frames(fit: &Fit) -> DMatrix<f64> {
+    let columns = fit.problem.layout.len();
+    let framed = if fit.covariance.is_replaced { None } else { in_frame(fit.linear(), &fit.covariance).ok() };
+    let as_it_is = || fit.covariance.reduced.view((0, 0), (columns, columns)).into_owned();
+    framed.map_or_else(as_it_is, |framed| framed.dense(columns))
+}
+
 impl Uncertainty {
+    /// Brings sigmas of single origins to the frames of the plates, as the stated ones are: before and after of the dense columns.
+    fn take_frames_of_plates(&mut self, before: &[f64], after: &[f64]) {
+        for own in std::iter::once(&mut self.model_sigma).chain(&mut self.clustered_sigma) {
+            for (sigma, (before, after)) in own.iter_mut().zip(before.iter().zip(after)).filter(|(_, (b, _))| **b > 0.0)
+            {
+                *sigma *= after / before;
+            }
+        }
+    }
+
     /// 95 % interval of the joint noise of a reading, root mean square over some series, rad or m; none where it is not identifiable.
     pub fn joint_noise_of(&self, noise: &Noise, series: &[usize], reading: usize) -> Option<[f64; 2]> {
         Some(self.noise_information.as_ref()?.joint_noise(noise, series, &[reading], NORMAL_95).1)

@@ -79,9 +79,13 @@ impl Gauge {
     /// Covariance of the pose of a plate.
     pub fn placement(&self, problem: &Problem, placement: usize) -> Matrix6<f64> {
         let covariance = self.in_frame.placement(problem.layout.placements[placement].start);
-        // The body twist of `T M` is `Ad(M^-1)` times that of `T`.
-        let followed = adjoint(&self.of_placements[placement].inverse());
+        let followed = self.followed(placement);
         followed * covariance * followed.transpose()
+    }
+
+    /// Body twist of the pose of a plate as it is written by that of the fit: that of `T M` is `Ad(M^-1)` times that of `T`.
+    pub fn followed(&self, placement: usize) -> Matrix6<f64> {
+        adjoint(&self.of_placements[placement].inverse())
     }
 
     /// `camera_from_plate` of an image, of which the fit has this pose.

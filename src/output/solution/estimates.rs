@@ -4,19 +4,19 @@ use super::solution_json::EstimateRecord;
 use crate::assess::Uncertainty;
 use crate::error::{Code, Error, Result};
 use crate::identify::Solution;
+use crate::output::gauge::Gauge;
 use crate::output::names::column_names;
 use crate::solve::Fit;
 
-/// Posterior sigma of a column in its unit; `None` where it was held fixed or nothing touches it.
-fn sigma(fit: &Fit, column: usize) -> Option<f64> {
-    let known = fit.problem.layout.columns[column].free && fit.covariance.system.touched(column);
-    known.then(|| fit.covariance.sigma(column))
+/// False where a column was held fixed or nothing touches it.
+fn is_known(fit: &Fit, column: usize) -> bool {
+    fit.problem.layout.columns[column].free && fit.covariance.system.touched(column)
 }
 
 /// `1 - sigma^2 / prior^2` of a column with a prior.
 fn share_of_data(fit: &Fit, column: usize) -> Option<f64> {
     let prior = fit.problem.layout.columns[column].prior_sigma;
-    let sigma = sigma(fit, column).filter(|_| prior.is_finite())?;
+    let sigma = Some(fit.covariance.sigma(column)).filter(|_| is_known(fit, column) && prior.is_finite())?;
     Some((1.0 - (sigma / prior).powi(2)).max(0.0))
 }
 
@@ -25,7 +25,7 @@ pub fn determined(solution: &Solution, start: usize) -> bool {
     (start..start + 6).all(|c| solution.fit.covariance.system.touched(c))
 }
 
-/// Every column with what is known of it, beside its covariance what an `uncertainty` says.
+/// Every column with what is known of it, by the covariance that an `uncertainty` states, beside what else that says.
 ///
 /// # Errors
 /// A value or sigma that is not finite.
@@ -40,7 +40,8 @@ pub(super) fn estimates(
     let names = column_names(&fit.problem, series);
     let mut all = Vec::with_capacity(layout.len());
     for (k, (column, name)) in layout.columns.iter().zip(names).enumerate() {
-        let sigma = sigma(fit, k);
+        let stated = || uncertainty.map_or_else(|| fit.covariance.sigma(k), |u| u.covariance[(k, k)].max(0.0).sqrt());
+        let sigma = is_known(fit, k).then(stated);
         if !values[k].is_finite() || sigma.is_some_and(|s| !s.is_finite()) {
             let what = "its estimate is not finite";
             return Err(Error::new(
@@ -67,10 +68,19 @@ pub(super) fn estimates(
     Ok(all)
 }
 
-/// Lower triangle of the covariance of the dense part, row by row; zero where a column was held fixed or is not touched.
-pub(super) fn lower_triangle(fit: &Fit) -> Vec<f64> {
-    let known: Vec<bool> = (0..fit.problem.layout.len()).map(|k| sigma(fit, k).is_some()).collect();
-    let c = &fit.covariance.reduced;
+/// Lower triangle of the stated covariance of the dense part, row by row, that of placements as of the poses that are written; zero where a
+/// column was held fixed or is not touched.
+pub(super) fn lower_triangle(solution: &Solution, gauge: &Gauge) -> Vec<f64> {
+    let fit = &solution.fit;
+    let mut c = solution.uncertainty.covariance.clone();
+    for (placement, columns) in fit.problem.layout.placements.iter().enumerate() {
+        let followed = gauge.followed(placement);
+        let rows = followed * c.fixed_rows::<6>(columns.start);
+        c.fixed_rows_mut::<6>(columns.start).copy_from(&rows);
+        let columns_after = c.fixed_columns::<6>(columns.start) * followed.transpose();
+        c.fixed_columns_mut::<6>(columns.start).copy_from(&columns_after);
+    }
+    let known: Vec<bool> = (0..fit.problem.layout.len()).map(|k| is_known(fit, k)).collect();
     let entry = |i: usize, j: usize| if known[i] && known[j] { c[(i, j)] } else { 0.0 };
     (0..known.len()).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).collect()
 }

@@ -76,7 +76,7 @@ pub fn record(solution: &Solution, context: &Context, gauge: &Gauge, files: Vec<
         }),
         workspace: solution.uncertainty.workspace.clone(),
         estimates: seen.estimates()?,
-        covariance_lower: lower_triangle(&solution.fit),
+        covariance_lower: lower_triangle(solution, gauge),
         images: seen.images(),
         covariance_together: None,
         bodies: BodiesRecord::of(solution),

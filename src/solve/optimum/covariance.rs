@@ -24,6 +24,8 @@ pub struct Covariance {
     pub(super) added: Option<DMatrix<f64>>,
     /// Factors by which the sigmas of dense columns were enlarged after that.
     pub(super) enlarged: Vec<(usize, f64)>,
+    /// True where the covariance of the first columns is another than that of the system.
+    pub is_replaced: bool,
 }
 
 impl LinearProblem<'_> {
@@ -59,7 +61,7 @@ impl Covariance {
         let mut reduced = factor.inverse();
         fixed_are_known(problem, &mut reduced);
         let log_determinant = factor.log_determinant();
-        Self { reduced, log_determinant, system, factor, added: None, enlarged: Vec::new() }
+        Self { reduced, log_determinant, system, factor, added: None, enlarged: Vec::new(), is_replaced: false }
     }
 
     /// Steps for right-hand sides of their own.
@@ -96,6 +98,7 @@ impl Covariance {
         self.reduced.columns_mut(0, n).fill(0.0);
         self.reduced.view_mut((0, 0), (n, n)).copy_from(covariance);
         self.system.set_touched((0..n).map(touched));
+        self.is_replaced = true;
     }
 
     /// 6x6 block of six dense columns from `start`.

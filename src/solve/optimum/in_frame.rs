@@ -194,6 +194,11 @@ impl InFrame {
         self.frames.iter().find(|f| f.plates.contains(&plate))
     }
 
+    /// Covariance of so many dense columns, the first.
+    pub fn dense(&self, columns: usize) -> DMatrix<f64> {
+        self.covariance.reduced.view((0, 0), (columns, columns)).into_owned()
+    }
+
     /// Covariance of a placement.
     pub fn placement(&self, start: usize) -> Matrix6<f64> {
         self.covariance.block(start)
