@@ -1,4 +1,4 @@
-//! What can be promised of the flange: its expected error where the stops were, by the model and its covariance.
+//! What can be promised of the flange: its expected error in the region of the stops, by the model and its covariance.
 //!
 //! The error is that of the position relative to what stands still (the plate, or a fixed camera) at a stop of its own. Of the
 //! calibrated robot it is what the covariance says ([`FlangeModel`]: right on average over the stops), and what no model removes:

@@ -34,7 +34,7 @@ pub struct Uncertainty {
     pub joint_noise: Vec<Vec<[f64; 2]>>,
     /// What the data tell of the joint noise, also of that which counts as none; none where it was given.
     pub noise_information: Option<NoiseInformation>,
-    /// Expected error of the flange where the stops were, before and after; none without stops.
+    /// Expected error of the flange in the region of the stops, before and after; none without stops.
     pub flange: Option<FlangeErrors>,
     /// The origins that do best by themselves; none without stops, or where nothing beside origins and offsets was found.
     pub alone: Option<Robot>,

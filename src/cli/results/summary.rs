@@ -104,7 +104,7 @@ fn flange(r: &SolutionRecord) -> Vec<String> {
     let i = e.intervals.as_ref();
     let (alone_m, of_alone) = e.best_urdf_m();
     let mut lines = vec![
-        format!("accuracy  expected flange error where the stops were, RMS{told}:"),
+        format!("accuracy  expected flange error in the joint ranges of the stops, RMS{told}:"),
         row("nominal robot", e.nominal_m, i.map(|i| i.nominal_m)),
         row(if r.has_no_robot() { "poses of the controller" } else { "corrected URDF alone" }, alone_m, of_alone),
     ];

@@ -428,7 +428,7 @@ pub struct SolutionRecord {
     pub identifiability: Option<Identifiability>,
     /// Evidence of the robot models where the data chose among them.
     pub evidences: Vec<Evidence>,
-    /// Expected error of the flange where the stops were, before and after; none without stops, and in files of earlier versions.
+    /// Expected error of the flange in the region of the stops, before and after; none without stops, and in files of earlier versions.
     #[serde(default)]
     pub flange: Option<FlangeErrors>,
     /// Evidence of the lenses of cameras whose lens was open.
