@@ -20,7 +20,7 @@ use robotcal::output::files;
 use robotcal::output::restore::measured_series;
 use robotcal::output::solution_json;
 use robotcal::problem::{Adjustment, Problem, State};
-use robotcal::series::CameraMount;
+use robotcal::series::{CameraMount, ScaleBar};
 use robotcal::simulate::truth::Truth;
 use robotcal::solve::{Elimination, LinearProblem, in_frame_by};
 
@@ -311,6 +311,7 @@ fn the_flange_is_as_well_known_however_loosely_the_plate_was_printed() {
     let known = |tolerance_m: f64| {
         let mut series = series(CameraMount::Hand, &description);
         series.plate.markers.iter_mut().for_each(|m| m.sigma_m = tolerance_m);
+        series.plate.scale = Some(ScaleBar { from: 0, to: 47, distance_m: 0.25812, sigma_m: 1e-5 });
         let chain = description.chain(None, None).unwrap();
         let options = Options { model: RobotModel::Rigid, ..Options::default() };
         let solution = identify(chain, &[series], &options).unwrap();

@@ -1,5 +1,7 @@
 //! All scalar estimates of the dense part with their sigmas, and their covariance.
 
+use nalgebra::DMatrix;
+
 use super::solution_json::EstimateRecord;
 use crate::assess::Uncertainty;
 use crate::error::{Code, Error, Result};
@@ -25,13 +27,14 @@ pub fn determined(solution: &Solution, start: usize) -> bool {
     (start..start + 6).all(|c| solution.fit.covariance.system.touched(c))
 }
 
-/// Every column with what is known of it, by the covariance that an `uncertainty` states, beside what else that says.
+/// Every column with what is known of it by the `stated` covariance, beside what else an `uncertainty` says.
 ///
 /// # Errors
 /// A value or sigma that is not finite.
 pub(super) fn estimates(
     fit: &Fit,
     series: &[String],
+    stated: &DMatrix<f64>,
     uncertainty: Option<&Uncertainty>,
 ) -> Result<Vec<EstimateRecord>> {
     let layout = &fit.problem.layout;
@@ -40,8 +43,7 @@ pub(super) fn estimates(
     let names = column_names(&fit.problem, series);
     let mut all = Vec::with_capacity(layout.len());
     for (k, (column, name)) in layout.columns.iter().zip(names).enumerate() {
-        let stated = || uncertainty.map_or_else(|| fit.covariance.sigma(k), |u| u.covariance[(k, k)].max(0.0).sqrt());
-        let sigma = is_known(fit, k).then(stated);
+        let sigma = is_known(fit, k).then(|| stated[(k, k)].max(0.0).sqrt());
         if !values[k].is_finite() || sigma.is_some_and(|s| !s.is_finite()) {
             let what = "its estimate is not finite";
             return Err(Error::new(
@@ -68,19 +70,24 @@ pub(super) fn estimates(
     Ok(all)
 }
 
-/// Lower triangle of the stated covariance of the dense part, row by row, that of placements as of the poses that are written; zero where a
-/// column was held fixed or is not touched.
-pub(super) fn lower_triangle(solution: &Solution, gauge: &Gauge) -> Vec<f64> {
-    let fit = &solution.fit;
-    let mut c = solution.uncertainty.covariance.clone();
-    for (placement, columns) in fit.problem.layout.placements.iter().enumerate() {
+/// The covariance of the dense part that is stated, without a robot that of the fit; that of placements is of the poses that are written.
+pub(super) fn covariance_of_columns(fit: &Fit, gauge: &Gauge, uncertainty: Option<&Uncertainty>) -> DMatrix<f64> {
+    let layout = &fit.problem.layout;
+    let of_fit = || fit.covariance.reduced.view((0, 0), (layout.len(), layout.len())).into_owned();
+    let mut stated = uncertainty.map_or_else(of_fit, |u| u.covariance.clone());
+    for (placement, columns) in layout.placements.iter().enumerate() {
         let followed = gauge.followed(placement);
-        let rows = followed * c.fixed_rows::<6>(columns.start);
-        c.fixed_rows_mut::<6>(columns.start).copy_from(&rows);
-        let columns_after = c.fixed_columns::<6>(columns.start) * followed.transpose();
-        c.fixed_columns_mut::<6>(columns.start).copy_from(&columns_after);
+        let rows = followed * stated.fixed_rows::<6>(columns.start);
+        stated.fixed_rows_mut::<6>(columns.start).copy_from(&rows);
+        let columns_after = stated.fixed_columns::<6>(columns.start) * followed.transpose();
+        stated.fixed_columns_mut::<6>(columns.start).copy_from(&columns_after);
     }
-    let known: Vec<bool> = (0..fit.problem.layout.len()).map(|k| is_known(fit, k)).collect();
-    let entry = |i: usize, j: usize| if known[i] && known[j] { c[(i, j)] } else { 0.0 };
+    stated
+}
+
+/// Lower triangle of the stated covariance, row by row; zero where a column was held fixed or is not touched.
+pub(super) fn lower_triangle(fit: &Fit, stated: &DMatrix<f64>) -> Vec<f64> {
+    let known: Vec<bool> = (0..stated.nrows()).map(|k| is_known(fit, k)).collect();
+    let entry = |i: usize, j: usize| if known[i] && known[j] { stated[(i, j)] } else { 0.0 };
     (0..known.len()).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).collect()
 }

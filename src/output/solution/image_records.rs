@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::Matrix6;
 
-use super::estimates::estimates;
+use super::estimates::{covariance_of_columns, estimates};
 use super::residuals::{poses, residuals};
 use super::solution_json::{
     ApparentShift, CameraRecord, EstimateRecord, FreePoseRecord, ImageRecord, ObservationColumns, PlateRecord,
@@ -47,7 +47,8 @@ impl ImageRecords<'_> {
     /// # Errors
     /// Estimates that are not finite.
     pub fn estimates(&self) -> Result<Vec<EstimateRecord>> {
-        estimates(self.fit, self.names, self.uncertainty)
+        let stated = covariance_of_columns(self.fit, self.gauge, self.uncertainty);
+        estimates(self.fit, self.names, &stated, self.uncertainty)
     }
 
     /// Residuals in numbers.

@@ -1,7 +1,7 @@
 //! From a solution to the record in solution.json.
 
 use super::bodies_record::BodiesRecord;
-use super::estimates::{determined, lower_triangle};
+use super::estimates::{covariance_of_columns, determined, lower_triangle};
 use super::image_records::{ImageRecords, flat};
 use super::solution_json::{
     AccuracyRecord, FORMAT, JointRecord, PlacedRecord, ProgramRecord, RobotRecord, ScatterRecord, SolutionRecord,
@@ -30,6 +30,7 @@ pub fn record(solution: &Solution, context: &Context, gauge: &Gauge, files: Vec<
         uncertainty: Some(&solution.uncertainty),
         held_out_mm: &accuracy.per_image_mm,
     };
+    let stated = covariance_of_columns(&solution.fit, gauge, seen.uncertainty);
     Ok(SolutionRecord {
         format: FORMAT,
         program: ProgramRecord {
@@ -76,7 +77,7 @@ pub fn record(solution: &Solution, context: &Context, gauge: &Gauge, files: Vec<
         }),
         workspace: solution.uncertainty.workspace.clone(),
         estimates: seen.estimates()?,
-        covariance_lower: lower_triangle(solution, gauge),
+        covariance_lower: lower_triangle(&solution.fit, &stated),
         images: seen.images(),
         covariance_together: None,
         bodies: BodiesRecord::of(solution),
