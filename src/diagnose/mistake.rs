@@ -2,7 +2,7 @@
 
 use super::kind::{Kind, Quantity, Subject, Weight};
 use crate::error::Code;
-use crate::series::CameraMount;
+use crate::series::{CameraMount, LengthUnit};
 
 /// What was done wrong.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,6 +96,8 @@ pub enum MistakeKind {
         /// Its pitch as stated, m.
         pitch_m: f64,
     },
+    /// Measured positions are in this unit and not in metres.
+    MeasuredUnit(LengthUnit),
     /// A table of poses or positions is to be read in another way.
     Poses {
         /// Which.
@@ -165,6 +167,15 @@ impl MistakeKind {
                 Self::Rows { below: all_below, columns: all, part: None },
             ) => (below, columns) == (all_below, all),
             _ => false,
+        }
+    }
+
+    /// By how much what was measured shrinks, and its misfit with it, where this is undone: what is left tells nothing of the unit where the misfit
+    /// merely shrank. An arm that turns about its target fits positions in any unit.
+    pub const fn shrinks(&self) -> f64 {
+        match self {
+            Self::MeasuredUnit(unit) => unit.metres,
+            _ => 1.0,
         }
     }
 }
@@ -261,6 +272,7 @@ impl Kind for Mistake {
             MistakeKind::Mirrored(_) => Code::ImagesMirrored,
             MistakeKind::Lengths { .. } => Code::LinkLengthsWrong,
             MistakeKind::PlateSize { .. } => Code::PlatePitchWrong,
+            MistakeKind::MeasuredUnit(_) => Code::MeasuredUnit,
             MistakeKind::Poses { code, .. } => *code,
         }
     }
@@ -397,6 +409,7 @@ impl Kind for Mistake {
             MistakeKind::PlateSize { .. } => {
                 "measure the plate with a ruler and correct pitch_m (of tags tag_m or marker_m) in plate.toml; if it is right, the URDF is of another size of this robot".into()
             }
+            MistakeKind::MeasuredUnit(unit) => format!("multiply x_m, y_m and z_m by {}", unit.metres),
             MistakeKind::Poses { remedy, .. } => remedy.clone(),
         }
     }
@@ -506,6 +519,7 @@ impl Mistake {
                 1e3 * pitch_m,
                 1.0 / scale
             ),
+            MistakeKind::MeasuredUnit(unit) => format!("positions are in {}: in metres the {noun}s fit", unit.name),
             MistakeKind::Poses { what, .. } => what.clone(),
         }
     }

@@ -214,3 +214,19 @@ fn sockets_that_were_pushed_together_are_named_as_their_fixture() {
         assert!(fixture(&by_turns(seed, 60, shift).solve(RobotModel::Rigid)).is_none());
     }
 }
+
+/// An arm that turns its wrist about one place fits the points in any unit, as these shrink with the point on the tip: what is left shrinks alike,
+/// and tells nothing.
+#[test]
+fn points_about_the_wrist_are_in_no_other_unit() {
+    for seed in [74, 75] {
+        let mut dice = Dice::new(seed);
+        let truth = truth(&mut dice, &chain());
+        let world = World::taken(dice, truth, Kind::Points, 24, (2e-5, 0.0), 0.0, |dice| {
+            let wrist = readings(dice).split_off(3);
+            ([vec![0.1, -1.2, 1.4], wrist].concat(), vec![0.0; 6])
+        });
+        let refused = identified(&world, world.series.clone()).err().map(|refused| refused.code);
+        assert_ne!(refused, Some(Code::MeasuredUnit), "seed {seed}");
+    }
+}

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::misfit::{FEWEST_POSES, SeenAt};
@@ -17,13 +18,13 @@ use crate::identify::mistakes::readings::{columns_undone, mirrored_signs_undone,
 use crate::identify::mistakes::suspects::some_of;
 use crate::linalg::lower_median;
 use crate::model::robot::Robot;
-use crate::problem::{Adjustment, BodyMeasurement, BodySeen, Problem};
+use crate::problem::{Adjustment, BodyMeasurement, BodySeen, InstrumentKind, Problem};
 
 /// What was seen with a mistake undone, and its name.
 type Undone = (Vec<SeenAt>, MistakeKind);
 
 /// Refuses measurements and readings that fit with one of the usual mistakes undone, and only then. `misfit` is the median misfit of poses
-/// (rad + m), or of points (m), with given readings. A small one may have a mistake, too: the sign of a joint moves a body near its axis by little.
+/// (rad + m), or of points (m), with given readings; what shrinks them counts by what it leaves of it in their own unit. A small one may have a mistake, too: the sign of a joint moves a body near its axis by little.
 ///
 /// # Errors
 /// The mistake that explains most.
@@ -61,22 +62,33 @@ pub(super) fn name_mistake(
     });
     let undone = read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, (&given, stops)));
     // In sockets an arm that hardly moves fits without a cause.
-    let is_tried = |(_, kind): &Undone| {
-        let hardly_moves = matches!(kind, MistakeKind::Unit { joint: None, are_degrees: true });
-        !hardly_moves || is_suspicious
+    let undone: Vec<Undone> = undone.filter(|(_, kind)| !hardly_moves(kind) || is_suspicious).collect();
+    let tried = undone.into_par_iter().map(|(undone, kind)| (misfit(robot, &undone) / kind.shrinks(), kind));
+    let instrument = &problem.instruments[given[0].instrument];
+    let apart = if instrument.kind == InstrumentKind::Socket { f64::INFINITY } else { usually_apart(&given) };
+    let explains = |(left, kind): &Explained| {
+        let told_by = if hardly_moves(kind) { apart.min(as_described) } else { as_described };
+        *left < limits.mistake_explains * told_by && left * kind.shrinks() < limits.suspicious_misfit
     };
-    let undone: Vec<Undone> = undone.filter(is_tried).collect();
-    let tried: Vec<Explained> = undone.into_par_iter().map(|(undone, kind)| (misfit(robot, &undone), kind)).collect();
-    let most = limits.suspicious_misfit.min(limits.mistake_explains * as_described);
-    let explaining: Vec<Explained> = tried.into_iter().filter(|(left, _)| *left < most).collect();
+    let explaining: Vec<Explained> = tried.filter(explains).collect();
     likeliest(&explaining, robot, limits).map_or(Ok(()), |(named, kind)| {
-        let left = explaining[named].0;
-        let instrument = &problem.instruments[given[0].instrument];
+        let left = explaining[named].0 * explaining[named].1.shrinks();
         let of = instrument.place();
         let rows_of = rows_of_bodies(adjustment, measured, limits);
         let mistake = Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of };
         Err(Finding::from(mistake).refusal())
     })
+}
+
+/// True for a mistake without which the arm hardly moves: places that hardly differ do not tell it from one that turns about them.
+const fn hardly_moves(kind: &MistakeKind) -> bool {
+    matches!(kind, MistakeKind::Unit { joint: None, are_degrees: true })
+}
+
+/// Median distance of the places from their middle, m.
+fn usually_apart(seen: &[SeenAt]) -> f64 {
+    let middle = seen.iter().map(|s| s.seen.position()).sum::<Vector3<f64>>() / seen.len() as f64;
+    lower_median(seen.iter().map(|s| (s.seen.position() - middle).norm()))
 }
 
 /// True where a misfit is many times what is stated, of measurements enough to tell a mistake from chance.

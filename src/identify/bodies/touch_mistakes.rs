@@ -60,6 +60,14 @@ enum What {
 }
 
 impl What {
+    /// As [`MistakeKind::shrinks`].
+    const fn shrinks(&self) -> f64 {
+        match self {
+            Self::Kind(kind) => kind.shrinks(),
+            _ => 1.0,
+        }
+    }
+
     /// Stops of which a place counts as unknown.
     fn stops(&self, touches: &Touches) -> Option<Vec<String>> {
         let at = |is: &dyn Fn(usize, &Touch) -> bool| {
@@ -201,9 +209,9 @@ fn explained(
         given.tool.map(|tool| without_tool(touches, given, tool)).into_iter().collect::<Vec<Undone>>(),
     ];
     let all: Vec<Undone> = kinds.into_iter().flat_map(|undone| nearest(robot, undone)).collect();
-    let explains = |fit: &FrameFit| explains(fit, found, limits);
     let tried = |undone: Undone| {
-        fit(robot, &undone.touches, &undone.given, limits).ok().filter(explains).map(|fit| (fit, undone))
+        let left = fit(robot, &undone.touches, &undone.given, limits).ok();
+        left.filter(|fit| explains(fit, &undone.what, (found, limits))).map(|fit| (fit, undone))
     };
     let (best, undone) = best_of(all.into_par_iter().filter_map(tried).collect(), robot, limits)?;
     let one_of = one_of(robot, touches, given, (&best, &undone.what, found, limits));
@@ -231,8 +239,8 @@ fn best_of(mut all: Vec<(FrameFit, Undone)>, robot: &KnownRobot, limits: &Limits
 }
 
 /// True where a fit leaves little of what contradicts another.
-fn explains(fit: &FrameFit, found: &FrameFit, limits: &Limits) -> bool {
-    fit.contradiction(limits) < limits.mistake_explains * found.contradiction(limits)
+fn explains(fit: &FrameFit, what: &What, (found, limits): (&FrameFit, &Limits)) -> bool {
+    fit.contradiction(limits) < what.shrinks() * limits.mistake_explains * found.contradiction(limits)
         && fit.rms_m < limits.touch_sigma_m
 }
 
@@ -255,8 +263,8 @@ fn one_of(
     (best, what, found, limits): (&FrameFit, &What, &FrameFit, &Limits),
 ) -> Option<Vec<String>> {
     let own = what.stops(touches)?;
-    let is_rival = |(touches, _): &(Touches, What)| {
-        let left = fit(robot, touches, given, limits).ok().filter(|fit| explains(fit, found, limits));
+    let is_rival = |(touches, what): &(Touches, What)| {
+        let left = fit(robot, touches, given, limits).ok().filter(|fit| explains(fit, what, (found, limits)));
         left.is_some_and(|left| best.contradiction(limits) > limits.mistake_explains * left.contradiction(limits))
     };
     let others: Vec<(Touches, What)> = other_places(touches).into_iter().flatten().collect();
