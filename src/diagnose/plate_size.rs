@@ -1,4 +1,5 @@
-//! Whether a plate has the size that its file states. The lengths of the robot's links are the only others there are.
+//! Whether a plate has the size that its file states. The lengths of the robot's links are the only others there are; of poses without a robot, the
+//! positions of the controller.
 
 use nalgebra::DVector;
 
@@ -16,10 +17,38 @@ const ASPECT: usize = 1;
 /// Stops that tell of the size: what more of them leave open is small beside what the links do.
 const MOST_STOPS: usize = 2000;
 
+/// The lengths that tell the size of a plate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ToldBy {
+    /// Those of the links.
+    Links,
+    /// The same with a rail that moves the arm or the plate, whose readings may be as wrong as the plate's size.
+    LinksOnRail,
+    /// Those between poses of a controller: nothing is known of the links.
+    Poses,
+}
+
+impl ToldBy {
+    fn of(state: &State) -> Self {
+        match state.robot.chain.pose_coordinates() {
+            Some(_) => Self::Poses,
+            None if is_on_rail(state) => Self::LinksOnRail,
+            None => Self::Links,
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Links | Self::LinksOnRail => "the links of the robot",
+            Self::Poses => "the positions of the controller",
+        }
+    }
+}
+
 /// A reason not to believe the size of a plate.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DoubtedSize {
-    /// The links of the robot say another size.
+    /// The links of the robot, or the positions of its controller, say another size.
     Contradicted {
         /// True where the size was measured (`[scale]`).
         measured: bool,
@@ -29,8 +58,8 @@ pub enum DoubtedSize {
         sigma: f64,
         /// Gate or note.
         weight: Weight,
-        /// True where a rail moves the arm or the plate, whose readings may be as wrong as the plate's size.
-        on_rail: bool,
+        /// What says so.
+        told_by: ToldBy,
     },
     /// Rows and columns differ in scale.
     Uneven {
@@ -38,11 +67,10 @@ pub enum DoubtedSize {
         off: f64,
         /// Prior sigma of it.
         tolerance: f64,
-        /// By how much it is longer along x and along y than its file says, each with its standard deviation, as far as the links of the robot
-        /// tell its size.
+        /// By how much it is longer along x and along y than its file says, each with its standard deviation, as far as its size is told.
         along: Option<[(f64, f64); 2]>,
-        /// As above.
-        on_rail: bool,
+        /// What tells its size.
+        told_by: ToldBy,
     },
 }
 
@@ -50,7 +78,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     let Adjustment { problem, state } = &fit.adjustment;
     let limits = setting.limits;
     let some = fit.adjustment.some_stops(MOST_STOPS, MOST_STOPS);
-    let on_rail = is_on_rail(state);
+    let told_by = ToldBy::of(state);
     let mut doubts = Vec::new();
     for (k, plate) in problem.plates.iter().enumerate() {
         let released = ReleasedSize::of(some.as_ref().unwrap_or(&fit.adjustment), k);
@@ -66,14 +94,14 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
                 _ => None,
             }
         {
-            doubts.push(DoubtedSize::Contradicted { measured, off: told.off, sigma: told.sigma, weight, on_rail });
+            doubts.push(DoubtedSize::Contradicted { measured, off: told.off, sigma: told.sigma, weight, told_by });
         }
         if let Some((off, tolerance)) = uneven(&fit.adjustment, k, limits) {
             let along = told.or_else(|| released.fitted()).map(|told| {
                 let sigma = told.sigma.hypot(0.5 * tolerance);
                 [0.5 * off, -0.5 * off].map(|half| (told.off + half, sigma))
             });
-            doubts.push(DoubtedSize::Uneven { off, tolerance, along, on_rail });
+            doubts.push(DoubtedSize::Uneven { off, tolerance, along, told_by });
         }
     }
     doubts
@@ -82,7 +110,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
 /// Plates whose rows and columns differ in scale, as images alone say: their shape needs no robot.
 pub fn uneven_plates(adjustment: &Adjustment, limits: &Limits) -> Vec<DoubtedSize> {
     let all = (0..adjustment.problem.plates.len()).filter_map(|k| uneven(adjustment, k, limits));
-    all.map(|(off, tolerance)| DoubtedSize::Uneven { off, tolerance, along: None, on_rail: false }).collect()
+    all.map(|(off, tolerance)| DoubtedSize::Uneven { off, tolerance, along: None, told_by: ToldBy::Links }).collect()
 }
 
 /// The x/y scale of a plate whose size was not measured and its prior sigma, where it is far beyond that.
@@ -138,18 +166,20 @@ impl Kind for DoubtedSize {
 
     fn seen(&self) -> String {
         match self {
-            Self::Contradicted { measured, off, sigma, .. } => format!(
-                "the links of the robot say that it is {:.2} % (+- {:.2} %) {} than {} says, and every length goes wrong with it",
+            Self::Contradicted { measured, off, sigma, told_by, .. } => format!(
+                "{} say that it is {:.2} % (+- {:.2} %) {} than {} says, and every length goes wrong with it",
+                told_by.name(),
                 100.0 * off.abs(),
                 100.0 * sigma,
                 if *off > 0.0 { "larger" } else { "smaller" },
                 if *measured { "[scale]" } else { "its file" },
             ),
-            Self::Uneven { off, along, .. } => format!(
+            Self::Uneven { off, along, told_by, .. } => format!(
                 "its rows and columns differ in scale by {:.2} %{}, so it was not made to size, and all lengths hang on its size",
                 100.0 * off.abs(),
                 along.map_or_else(String::new, |[(x, sigma), (y, _)]| format!(
-                    " (by the links of the robot it is {:+.2} % along x and {:+.2} % along y, +- {:.2} %)",
+                    " (by {} it is {:+.2} % along x and {:+.2} % along y, +- {:.2} %)",
+                    told_by.name(),
                     100.0 * x,
                     100.0 * y,
                     100.0 * sigma
@@ -159,8 +189,14 @@ impl Kind for DoubtedSize {
     }
 
     fn remedy(&self) -> String {
-        let (Self::Contradicted { on_rail, .. } | Self::Uneven { on_rail, .. }) = *self;
+        let (Self::Contradicted { told_by, .. } | Self::Uneven { told_by, .. }) = *self;
         let remedy = match self {
+            Self::Contradicted { measured: true, told_by: ToldBy::Poses, .. } => {
+                "check that distance, and that the positions in controller.csv are in metres; a controller whose model of its arm is of another size computes them too long or too short"
+            }
+            Self::Contradicted { measured: false, told_by: ToldBy::Poses, .. } => {
+                "measure two far markers and give [scale] in plate.toml, or correct its pitch_m (of tags tag_m or marker_m); if the plate is right, the controller computes its positions by an arm of another size, or in another unit"
+            }
             Self::Contradicted { measured: true, .. } => {
                 "check that distance, and that the lengths in the URDF are those of this robot"
             }
@@ -169,7 +205,7 @@ impl Kind for DoubtedSize {
             }
             Self::Uneven { .. } => "measure two far markers and give [scale] in plate.toml",
         };
-        let rail = if on_rail { OR_THE_RAIL } else { "" };
+        let rail = if told_by == ToldBy::LinksOnRail { OR_THE_RAIL } else { "" };
         format!("{remedy}{rail}")
     }
 }

@@ -1,7 +1,7 @@
 //! The report: complete, self-contained, and safe against whatever stands in names.
 
 use crate::outputs_support::{context, robot, solved};
-use robotcal::diagnose::{DoubtedSize, ExchangedReadings, Finding, OddImage, SmallGain, Weight};
+use robotcal::diagnose::{DoubtedSize, ExchangedReadings, Finding, OddImage, SmallGain, ToldBy, Weight};
 use robotcal::error::{Code, Notice};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
 use robotcal::output::verdict::{Trust, Verdict, VerdictReason};
@@ -157,7 +157,7 @@ fn what_was_seen_and_what_to_do_stay_apart() {
         off: 0.02,
         sigma: 0.001,
         weight: Weight::Gate,
-        on_rail: false,
+        told_by: ToldBy::Links,
     });
     assert!(found.fails() && found.remedy().contains("; "), "a remedy of two parts: {found}");
     let mut record = record();
@@ -183,8 +183,13 @@ fn what_was_seen_and_what_to_do_stay_apart() {
 
 #[test]
 fn rows_that_were_exchanged_are_put_right_before_a_failed_result_is_tried_again() {
-    let doubted =
-        DoubtedSize::Contradicted { measured: false, off: 0.02, sigma: 0.001, weight: Weight::Gate, on_rail: false };
+    let doubted = DoubtedSize::Contradicted {
+        measured: false,
+        off: 0.02,
+        sigma: 0.001,
+        weight: Weight::Gate,
+        told_by: ToldBy::Links,
+    };
     let pair = vec!["img_003.png".to_owned(), "img_008.png".to_owned()];
     let exchanged = Finding::from(ExchangedReadings {
         circle: pair.clone(),

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix6, Vector6};
 use robotcal::assess::Limits;
 use robotcal::calibration::{Calibration, Ends, Export, Inputs};
-use robotcal::diagnose::Finding;
+use robotcal::diagnose::{DoubtedSize, Finding, ToldBy};
 use robotcal::geom::{Pose, log_so3};
 use robotcal::identify::{Options, RobotModel, identify, verify_series};
 use robotcal::model::inverse::{reading_limits, solve_from};
@@ -149,6 +149,21 @@ fn errors_of_the_model_in_the_controller_are_no_noise_of_a_rail() {
         _ => None,
     });
     assert!(found.unwrap().readings_are_poses, "{found:?}");
+}
+
+/// Positions 2 % too long: without a robot there are no links that could say so.
+#[test]
+fn the_size_of_a_plate_is_told_by_the_positions_of_the_controller() {
+    let mut all = poses(&truth(), 5);
+    all.iter_mut().for_each(|(_, pose)| pose.translation *= 1.02);
+    let calibration = calibrated(&series("rotvec_rad", "rx,ry,rz", &all, rotation_vector)).unwrap();
+    let doubted = calibration.solution().findings.iter().find_map(|f| match f {
+        Finding::DoubtedSize(DoubtedSize::Contradicted { off, told_by, .. }) => Some((*off, *told_by)),
+        _ => None,
+    });
+    // 50 positions of 0.2 mm over decimetres tell the size to less than 1e-3.
+    let (off, told_by) = doubted.unwrap();
+    assert!((off - 0.02).abs() < 3e-3 && told_by == ToldBy::Poses, "{off} {told_by:?}");
 }
 
 /// The poses are what they are: that nothing is gained over them is no fault.
