@@ -19,6 +19,7 @@ use crate::geom::{Pose, adjoint};
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Adjustment, Layout};
+use crate::solve::Spread;
 
 /// Samples of the workspace: so many in the region of the stops, as many within all joint limits.
 const SAMPLES: usize = 250;
@@ -227,8 +228,13 @@ impl<'a> FlangeModel<'a> {
     }
 
     /// 95 % interval of the root mean square of an error that is known up to the errors of the model: `known` gives, in the frame of
-    /// the flange, what of it is known, m.
-    pub(super) fn interval_m(&self, samples: &[Posture], known: impl Fn(usize) -> Vector3<f64>) -> [f64; 2] {
+    /// the flange, what of it is known, m; `beside` is the mean square of what has nothing to do with the model, m^2.
+    pub(super) fn interval_m(
+        &self,
+        samples: &[Posture],
+        known: impl Fn(usize) -> Vector3<f64>,
+        beside: Spread,
+    ) -> [f64; 2] {
         let n = self.layout.theta_len();
         let mut sums = MeanSquare::new(n);
         for (k, sample) in samples.iter().enumerate() {
@@ -236,7 +242,7 @@ impl<'a> FlangeModel<'a> {
             let j = self.fitted_out(&pose, j);
             sums.add(&j.fixed_rows::<3>(0).into_owned(), &known(k));
         }
-        sums.interval_m(&self.covariance.view((0, 0), (n, n)).into_owned())
+        sums.interval_m(&self.covariance.view((0, 0), (n, n)).into_owned(), beside)
     }
 
     /// Samples of the region of the stops, then of everything within the joint limits.

@@ -37,6 +37,9 @@ limits! {
     joint_noise: f64 = 2e-3;
     /// Joint noise that no robot in order has, rad or m: two to five times what was found of real ones.
     unusual_joint_noise: f64 = 5e-4;
+    /// Held-out error over what the joint noise does to the flange, below which the hold-out contradicts it: of fifteen stops, either is known to a
+    /// fifth.
+    held_out_of_noise: f64 = 0.5;
     /// Share of the stops, whose poses were read, in other postures from which a choice as good leaves open which robot is the right one.
     open_postures: f64 = 0.25;
     /// Gain of the log likelihood by a tool on the flange from which the poses of a controller are taken for those of that tool.

@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::linalg::{product, symmetric_eigen};
+use crate::solve::Spread;
 
 /// Samples, of which a quantile of 2.5 % is known to 0.1 %.
 const SAMPLES: usize = 20_000;
@@ -42,9 +43,16 @@ impl MeanSquare {
         self.places += 1.0;
     }
 
-    /// 95 % interval of the root mean square, m, for columns of this covariance.
-    pub fn interval_m(&self, covariance: &DMatrix<f64>) -> [f64; 2] {
-        let mut squares = vec![self.d2 / self.places.max(1.0); SAMPLES];
+    /// 95 % interval of the root mean square, m, for columns of this covariance, with the mean square `beside` it (m^2) that has nothing to do with
+    /// them: its estimate is normal down to zero.
+    pub fn interval_m(&self, covariance: &DMatrix<f64>, beside: Spread) -> [f64; 2] {
+        let mut random = ChaCha8Rng::seed_from_u64(SEED - 1);
+        let known = self.d2 / self.places.max(1.0);
+        let mut with_others = || {
+            let y: f64 = StandardNormal.sample(&mut random);
+            known + (beside.variance + beside.sigma * y).max(0.0)
+        };
+        let mut squares: Vec<f64> = (0..SAMPLES).map(|_| with_others()).collect();
         for (k, [l, h]) in self.axes(covariance).unwrap_or_default().into_iter().enumerate() {
             // Each axis has samples of its own: one that hardly counts changes nothing of the others.
             let mut random = ChaCha8Rng::seed_from_u64(SEED + k as u64);
@@ -75,6 +83,8 @@ impl MeanSquare {
 mod tests {
     use super::*;
 
+    const NOTHING: Spread = Spread { variance: 0.0, sigma: 0.0 };
+
     #[test]
     fn as_many_mean_squares_lie_in_the_interval_as_it_says() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
@@ -87,7 +97,7 @@ mod tests {
             .collect();
         let mut sums = MeanSquare::new(columns);
         places.iter().for_each(|(j, d)| sums.add(j, d));
-        let [low, high] = sums.interval_m(&covariance);
+        let [low, high] = sums.interval_m(&covariance, NOTHING);
         let trials = 4000;
         let inside = (0..trials)
             .filter(|_| {
@@ -111,7 +121,7 @@ mod tests {
                 let j = Matrix3xX::from_fn(3, |i, c| ((i + 3 * c + 7 * k) as f64).sin());
                 sums.add(&j, &(Vector3::new(1e-3, -2e-4, 3e-4) * mirrored));
             }
-            sums.interval_m(&DMatrix::from_diagonal(&DVector::from_vec(vec![1e-6, 4e-7, negligible])))
+            sums.interval_m(&DMatrix::from_diagonal(&DVector::from_vec(vec![1e-6, 4e-7, negligible])), NOTHING)
         };
         let [low, high] = interval(1.0, 0.0);
         for [a, b] in [interval(-1.0, 0.0), interval(1.0, 1e-17)] {
@@ -123,7 +133,25 @@ mod tests {
     fn without_uncertainty_the_interval_is_the_known_error() {
         let mut sums = MeanSquare::new(2);
         sums.add(&Matrix3xX::zeros(2), &Vector3::new(3e-3, 0.0, 4e-3));
-        let [low, high] = sums.interval_m(&DMatrix::zeros(2, 2));
+        let [low, high] = sums.interval_m(&DMatrix::zeros(2, 2), NOTHING);
         assert!((low - 5e-3).abs() < 1e-12 && (high - 5e-3).abs() < 1e-12);
+    }
+
+    /// Quantiles of a normal variance alone: 1 +- 1.96 * 0.3, and one that may be none.
+    #[test]
+    fn a_scatter_that_is_not_known_makes_the_interval_wider() {
+        let of = |sigma: f64| {
+            let mut sums = MeanSquare::new(1);
+            sums.add(&Matrix3xX::zeros(1), &Vector3::zeros());
+            sums.interval_m(&DMatrix::zeros(1, 1), Spread { variance: 1e-6, sigma })
+        };
+        // 20000 samples know these quantiles to 0.02 of a sigma.
+        for (end, expected) in of(3e-7).into_iter().zip([0.412_f64, 1.588]) {
+            assert!((end - 1e-3 * expected.sqrt()).abs() < 2e-5, "{end}");
+        }
+        assert_eq!(of(8e-7)[0], 0.0);
+        for end in of(0.0) {
+            assert!((end - 1e-3).abs() < 1e-12, "{end}");
+        }
     }
 }

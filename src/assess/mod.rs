@@ -49,7 +49,7 @@ pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use points_apart::{DeviceMoved, OddPoints, device_moved, odd_points};
 pub use points_mistaken::{ReadingMistake, reading_mistake};
 pub use projection::ProjectionMap;
-pub use promise::{FlangeErrors, FlangeIntervals, usual_joint_sigma};
+pub use promise::{FlangeErrors, FlangeIntervals, StopNoise, scatter_m, usual_joint_sigma};
 pub use propagate::{PredictedPose, View, predict_pose};
 pub use statistics::{Ratio, best_run, bootstrap_ratio, by_cluster, log_chance, root_mean_square};
 pub use stops::{Structural, ideal_stops, minimal_set, structural};

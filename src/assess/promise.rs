@@ -13,6 +13,7 @@ use super::points::{MeasuredPoint, PointFit, lay_over};
 use super::root_mean_square;
 use crate::model::joint_terms::Term;
 use crate::model::robot::{Posture, Robot};
+use crate::solve::{JOINT_NOISE_FLOOR, NoiseInformation, Spread};
 
 /// Expected error of the position of the flange in the region of the stops, RMS of the length, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -58,12 +59,12 @@ impl FlangeErrors {
         (self.alone_m.unwrap_or(self.urdf_m), interval)
     }
 
-    /// `alone` has the origins that do best by themselves ([`urdf_alone`](super::urdf_alone)). `joint_sigma` is that of the readings at a stop, rad
-    /// or m; `None` where the nominal robot cannot be laid over the model.
+    /// `alone` has the origins that do best by themselves ([`urdf_alone`](super::urdf_alone)). `None` where the nominal robot cannot be laid over the
+    /// model.
     pub fn new(
         model: &FlangeModel,
         (robot, alone): (&Robot, Option<&Robot>),
-        joint_sigma: &[f64],
+        noise: StopNoise<'_>,
         stops: &[Posture],
     ) -> Option<Self> {
         let samples = model.region();
@@ -72,12 +73,11 @@ impl FlangeErrors {
         let nominal = nominal_laid_over(&whole, &samples)?;
         let lacking = displacements(&whole, &with(robot, |t| t == Term::Offset), &samples, stops);
         let alone_lacks = alone.map(|alone| displacements(&whole, alone, &samples, stops));
-        let scatter_m = scatter_m(&whole, joint_sigma, &samples);
+        let scatter = noise.scatter(&by_readings(&whole, &samples));
+        let scatter_m = scatter.variance.sqrt();
         let model_m = model.sigma_m(&samples).hypot(scatter_m);
         let in_flange = |k: usize| exact(&whole, &samples[k]).rotation.transpose() * nominal.residuals_m[k];
-        let interval = |known: &dyn Fn(usize) -> Vector3<f64>| {
-            model.interval_m(&samples, known).map(|rms_m| rms_m.hypot(scatter_m))
-        };
+        let interval = |known: &dyn Fn(usize) -> Vector3<f64>| model.interval_m(&samples, known, scatter);
         Some(Self {
             nominal_m: model_m.hypot(nominal.rms_m),
             urdf_m: model_m.hypot(rms(&lacking)),
@@ -124,13 +124,39 @@ fn rms(displacements: &[Vector3<f64>]) -> f64 {
     root_mean_square(&displacements.iter().map(|d| (d.norm_squared(), 1.0)).collect::<Vec<_>>())
 }
 
-/// What the noise of a stop does to the position of the flange, RMS over samples, m.
-fn scatter_m(robot: &Robot, joint_sigma: &[f64], samples: &[Posture]) -> f64 {
-    let square = |s: &Posture| {
-        let by_readings = robot.kinematics(s, &vec![0.0; s.readings.len()]).d_readings;
-        by_readings.iter().zip(joint_sigma).map(|(d, sigma)| d.fixed_rows::<3>(0).norm_squared() * sigma * sigma).sum()
-    };
-    root_mean_square(&samples.iter().map(|s| (square(s), 1.0)).collect::<Vec<_>>())
+/// Mean square over samples by which a reading of each joint moves the position of the flange, m^2 for 1 rad or m.
+fn by_readings(robot: &Robot, samples: &[Posture]) -> Vec<f64> {
+    let mut squares = vec![0.0; robot.chain.readings.len()];
+    for sample in samples {
+        let moved = robot.kinematics(sample, &vec![0.0; sample.readings.len()]).d_readings;
+        squares.iter_mut().zip(&moved).for_each(|(sum, d)| *sum += d.fixed_rows::<3>(0).norm_squared());
+    }
+    squares.iter().map(|sum| sum / samples.len().max(1) as f64).collect()
+}
+
+/// What the noise of a stop does to the position of the flange, RMS over postures, m.
+pub fn scatter_m(robot: &Robot, joint_sigma: &[f64], postures: &[Posture]) -> f64 {
+    StopNoise { joint_sigma, told: None }.scatter(&by_readings(robot, postures)).variance.sqrt()
+}
+
+/// Joint noise of a stop.
+#[derive(Clone, Copy)]
+pub struct StopNoise<'a> {
+    /// Per reading, rad or m.
+    pub joint_sigma: &'a [f64],
+    /// How well the data tell it, with the share of the stops that every series has; none where it counts as known.
+    pub told: Option<(&'a NoiseInformation, &'a [f64])>,
+}
+
+impl StopNoise<'_> {
+    /// Of a sum of the variances with these weights. What counts as none stays none.
+    fn scatter(&self, weights: &[f64]) -> Spread {
+        let all = weights.iter().zip(self.joint_sigma);
+        let counted: Vec<f64> =
+            all.clone().map(|(w, sigma)| if *sigma > JOINT_NOISE_FLOOR { *w } else { 0.0 }).collect();
+        let sigma = self.told.map_or(0.0, |(told, shares)| told.weighted(shares, &counted).0.sigma);
+        Spread { variance: all.map(|(weight, sigma)| weight * sigma * sigma).sum(), sigma }
+    }
 }
 
 /// Joint noise of a stop, RMS over stops with different noise, rad or m.

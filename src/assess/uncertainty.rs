@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::used_stops::{on_robot_sigmas, stops};
+use super::used_stops::{on_robot_sigmas, shares_of_series, stops};
 use crate::assess::{
-    FlangeErrors, FlangeModel, Identifiability, Limits, WorkspacePoint, clustered_covariance, identifiability,
-    urdf_alone, usual_joint_sigma,
+    FlangeErrors, FlangeModel, Identifiability, Limits, StopNoise, WorkspacePoint, clustered_covariance,
+    identifiability, urdf_alone, usual_joint_sigma,
 };
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Noise};
@@ -85,10 +85,14 @@ pub fn judge(
     let Adjustment { problem, state } = &fit.adjustment;
     let stated = std::mem::take(&mut found.covariance);
     let model = FlangeModel::of(&fit.adjustment, &stated, limits);
-    let noise = usual_joint_sigma(&on_robot_sigmas(problem));
+    let joint_sigma = &usual_joint_sigma(&on_robot_sigmas(problem));
+    let shares = shares_of_series(problem);
+    // Beside images the joint noise is known well.
+    let told = found.noise_information.as_ref().filter(|_| problem.used_on_robot().next().is_none());
+    let noise = StopNoise { joint_sigma, told: told.map(|told| (told, &shares[..])) };
     found.alone = model.as_ref().and_then(|m| urdf_alone(&state.robot, &problem.layout, &m.region()));
     let robots = (&state.robot, found.alone.as_ref());
-    let promise = |m: &FlangeModel| FlangeErrors::new(m, robots, &noise, &stops);
+    let promise = |m: &FlangeModel| FlangeErrors::new(m, robots, noise, &stops);
     found.flange = model.as_ref().and_then(promise);
     found.workspace = model.map(|m| m.workspace()).unwrap_or_default();
     found.covariance = stated;

@@ -16,6 +16,15 @@ pub(super) fn on_robot_sigmas(problem: &Problem) -> Vec<Vec<f64>> {
     on_robot.map(|s| problem.joint_sigma(s.series)).collect()
 }
 
+/// Share of these stops that every noise of stops has.
+pub(super) fn shares_of_series(problem: &Problem) -> Vec<f64> {
+    let mut shares = vec![0.0; problem.noise.joint.len()];
+    let on_robot: Vec<usize> =
+        problem.used_stops().into_iter().filter(|s| problem.stops[*s].posture.is_some()).collect();
+    on_robot.iter().for_each(|s| shares[problem.stops[*s].series] += 1.0 / on_robot.len() as f64);
+    shares
+}
+
 /// What stands still in the base frame for the first image on the robot, with its first column: the plate, or a fixed camera; without images
 /// an instrument.
 pub fn still(Adjustment { problem, state }: &Adjustment) -> Option<(Pose, usize)> {

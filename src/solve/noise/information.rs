@@ -218,22 +218,32 @@ impl NoiseInformation {
 
     /// Mean variance of some readings in some series (the noise of the stops and local errors together).
     pub fn mean_variance(&self, series: &[usize], readings: &[usize]) -> Spread {
+        let among = |all: &[usize], k: usize| if all.contains(&k) { 1.0 / all.len() as f64 } else { 0.0 };
+        let shares: Vec<f64> = (0..self.series).map(|s| among(series, s)).collect();
+        let weights: Vec<f64> = (0..self.readings).map(|r| among(readings, r)).collect();
+        let (sum, are_told) = self.weighted(&shares, &weights);
+        if are_told { sum } else { Spread { sigma: f64::INFINITY, ..sum } }
+    }
+
+    /// Sum of the variances of the readings with these weights, each the mean over the series with these shares; with whether the data tell of all of
+    /// them: the others count as known.
+    pub fn weighted(&self, shares: &[f64], weights: &[f64]) -> (Spread, bool) {
         let mut gradient = DVector::zeros(self.touched.len());
-        let (mut variance, mut told) = (0.0, true);
+        let (mut variance, mut are_told) = (0.0, true);
         let first = self.series * self.readings;
-        for &r in readings {
-            let own = series.iter().map(|s| (s * self.readings + r, series.len() as f64));
+        for (r, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+            let own = shares.iter().enumerate().map(|(s, share)| (s * self.readings + r, *share));
             let local = Some((first + r, 1.0)).filter(|(c, _)| r < self.locals && self.variances[*c] > 0.0);
-            for (c, of) in own.chain(local) {
-                let part = self.variances[c] / (of * readings.len() as f64);
+            for (c, share) in own.chain(local).filter(|(_, share)| *share > 0.0) {
+                let part = self.variances[c] * share * weight;
                 variance += part;
                 match self.touched.iter().position(|t| *t == c) {
                     Some(at) => gradient[at] += part,
-                    None => told = false,
+                    None => are_told = false,
                 }
             }
         }
         let sigma = (&self.covariance * &gradient).dot(&gradient).max(0.0).sqrt();
-        Spread { variance, sigma: if told { sigma } else { f64::INFINITY } }
+        (Spread { variance, sigma }, are_told)
     }
 }
