@@ -4,11 +4,18 @@
 //! `sum (e_k - e_{k-1})^2 / sum (e_k - mean)^2` with mean 2 and variance `4 (n - 2) / (n^2 - 1)` (J. von Neumann, *Distribution of the ratio of the
 //! mean square successive difference to the variance*, 1941). Errors of a drive, which come back with the reading, make it smaller.
 
+use super::limits::Limits;
 use crate::problem::Adjustment;
 use crate::solve::JOINT_NOISE_FLOOR;
 
 /// Fewest errors of a joint whose ratio has a variance.
 const FEWEST: usize = 3;
+
+/// Number of stops that tell together as much as one whose errors are its own: 1 where errors do not repeat.
+pub fn stops_for_one(fit: &Adjustment, limits: &Limits) -> f64 {
+    let repeats = Repeats::of(fit).filter(|r| r.deviate > limits.pattern_sigmas);
+    repeats.map_or(1.0, |repeats| repeats.stops_for_one().max(1.0))
+}
 
 /// How joint errors repeat over neighbouring readings, all joints together.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -147,6 +147,20 @@ impl Shown {
         Some(problem.body_measurements[k].instrument).filter(|i| is_socket(problem, *i))
     }
 
+    /// The bodies that it is between: what it tells of them spans the whole pose that was seen.
+    pub(super) fn between(self, problem: &Problem) -> [Changed; 2] {
+        match self {
+            Self::Image { index, .. } => {
+                let image = &problem.images[index];
+                [Changed::Placement(image.placement), Changed::Mounting(image.mounting)]
+            }
+            Self::Measurement(k) => {
+                let measured = &problem.body_measurements[k];
+                [Changed::Target(measured.body), Changed::Instrument(measured.instrument)]
+            }
+        }
+    }
+
     pub(super) fn tells_of(self, problem: &Problem, changed: Changed) -> bool {
         match (self, changed) {
             (_, Changed::Zero(_)) => true,

@@ -10,8 +10,11 @@
 //! The estimated joint noise has grown with the fault, so that `D` is small beside what the sizes say; it is compared with the squares `R` of what
 //! the poses of the images miss those of the readings, in units of the noise of both, which are as many as the degrees of freedom that the robot
 //! left, and with the squares `P` of the robot's errors over their priors, which are as many as it took: a step may take up either. `D / (R + P)`
-//! has a beta distribution where noise is Gaussian. Real robots err alike in postures that are alike, so that chance alone does not acquit them:
-//! the step must also explain most of `R`; one that explains less, but much, is a doubt.
+//! has a beta distribution where noise is Gaussian; what the step leaves of `R + P` says how much of them it explains. Priors on several columns together
+//! are part of the information and of `P`. `R` has every direction of the poses that were seen: what two cameras contradict each other by is in it.
+//! Where errors repeat over neighbouring readings, several stops count as one. Real robots err alike in postures that are alike, so that chance alone
+//! does not acquit them: the step must also explain most of `R`; one that explains less, but much, is a doubt. Its shift or its turn must be beyond
+//! its own sigma.
 //!
 //! Several targets on the tip may be held by one bracket: its twist `x` about their middle moves each of them, `A = sum_k T_k B_k`, with the columns
 //! `T_k` of a target and `B_k = [R' , -R' [d]; 0, R']` of its rotation `R` in the tip and its place `d` from the middle.
@@ -26,14 +29,14 @@ use std::collections::BTreeSet;
 use super::candidates::{Changed, Order, Shown};
 use super::displaced::{Carried, Displaced, Displacement};
 use super::images_shifted::ImagesShifted;
-use super::rows::{Linear, Part, Step};
+use super::rows::{Chances, Linear, Part, Step};
 use super::zero_moved::ZeroMoved;
-use crate::assess::{Accuracy, Limits};
+use crate::assess::{Accuracy, Limits, stops_for_one};
 use crate::diagnose::finding::Finding;
 use crate::diagnose::focus::{self, FocusChange};
 use crate::diagnose::kind::{CheckContext, Weight};
 use crate::fit::Fit;
-use crate::problem::{Adjustment, Problem, stop_name};
+use crate::problem::{Problem, stop_name};
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
@@ -47,15 +50,12 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
     let problem = &fit.problem;
     let mut linear = Linear::of(fit.linear());
     let columns = linear.columns();
-    let of_priors = prior_squares(fit);
+    let chances = Chances { stops_for_one: stops_for_one(fit, limits), share: limits.displaced_share };
     let all = Squares::of(&linear, problem);
     let (mut left, mut found, mut good) = (all.clone(), Vec::<Step>::new(), Vec::new());
     while found.len() < limits.displacements {
         let tried = linear.candidates(problem, limits.displaced_images);
-        let squares = left.poses.iter().sum::<f64>() + of_priors;
-        let Some(mut best) = linear.best(problem, &tried, (squares, &left.zeros), limits.displaced_share) else {
-            break;
-        };
+        let Some(mut best) = linear.best(problem, &tried, &left.zeros, chances) else { break };
         let log_chance = best.log_chance + (tried.len() as f64).ln();
         if log_chance > limits.displaced_false_alarms.ln() {
             break;
@@ -65,9 +65,7 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
         }
         let Some((next, step)) = linear.with(problem, &best) else { break };
         linear = next;
-        let mut poses = left.poses.clone();
-        poses[best.group] = (poses[best.group] - best.fall).max(0.0);
-        let before = std::mem::replace(&mut left, Squares { poses, ..Squares::of(&linear, problem) });
+        let before = std::mem::replace(&mut left, Squares::of(&linear, problem));
         let share = before.explained(&left, &best);
         tracing::debug!(?best.changed, ?best.order, first = ?best.shown.first(), moved = best.shown.len(), fall = best.fall, share,
             log_chance, change = ?best.change, "step");
@@ -87,7 +85,7 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
             good.clone_from(&found);
         }
     }
-    good.retain(Step::still_counts);
+    good.retain(|step| step.still_counts() && step.is_beyond(limits.displaced_sigmas));
     let first = |step: &Step| step.shown.first().map(|shown| shown.place(problem));
     good.sort_by_key(|s| (matches!(s.order, Order::Up(_)), first(s)));
     good
@@ -96,7 +94,7 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
 /// Squares of what was seen against the readings, by the index of the noise.
 #[derive(Clone)]
 struct Squares {
-    /// Of whole poses: `R`. They fall as the cost does.
+    /// Of whole poses: `R`.
     poses: Vec<f64>,
     /// Of positions, and of rotations, of bodies.
     bodies: [Vec<f64>; 2],
@@ -129,13 +127,6 @@ impl Squares {
         };
         of_poses.max(of_part)
     }
-}
-
-/// Squares of the errors of robot, mountings and placements over their priors, `P`.
-fn prior_squares(Adjustment { problem, state }: &Adjustment) -> f64 {
-    let values = state.values(&problem.layout);
-    let columns = problem.layout.columns[..problem.layout.theta_len()].iter().zip(values.iter());
-    columns.filter(|(c, _)| c.free).map(|(c, value)| ((value - c.prior_mean) / c.prior_sigma).powi(2)).sum()
 }
 
 fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {

@@ -1,6 +1,7 @@
 //! The linearised fit stop by stop, and what a change of one body or of the zero of a joint at some stops would explain of it; for
 //! [`super::pose_step`].
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -38,31 +39,38 @@ impl Row {
 
     /// Squares of what the poses that were seen, or these parts of those of bodies, miss of the readings.
     fn squares(&self, problem: &Problem, part: Part) -> f64 {
-        let mut bodies: Vec<Range<usize>> = Vec::new();
+        let mut columns = BTreeSet::new();
         for shown in self.shown.iter() {
-            let own = match (*shown, part) {
-                (Shown::Image { index, .. }, Part::Pose) => Changed::Placement(problem.images[index].placement),
-                (Shown::Measurement(k), _) => Changed::Target(problem.body_measurements[k].body),
-                (Shown::Image { .. }, _) => continue,
-            };
-            let all = own.columns(&problem.layout, &[]);
-            let columns = match part {
-                Part::Pose => all,
-                Part::Position => all.start..all.end.min(all.start + 3),
-                Part::Rotation => all.end.min(all.start + 3)..all.end,
-            };
-            if !columns.is_empty() && !bodies.contains(&columns) {
-                bodies.push(columns);
+            for own in shown.between(problem) {
+                let all = own.columns(&problem.layout, &[]);
+                let turns = all.end.min(all.start + 3);
+                match (shown, own, part) {
+                    (_, _, Part::Pose) => columns.extend(all),
+                    (Shown::Measurement(_), Changed::Target(_), Part::Position) => columns.extend(all.start..turns),
+                    (Shown::Measurement(_), Changed::Target(_), Part::Rotation) => columns.extend(turns..all.end),
+                    _ => (),
+                }
             }
         }
-        let columns: Vec<usize> = bodies.into_iter().flatten().collect();
-        if columns.is_empty() {
-            return 0.0;
-        }
-        let by_pose = self.by_columns.select_columns(&columns);
-        let score = by_pose.tr_mul(&self.score);
-        SymmetricFactor::new(&by_pose.tr_mul(&by_pose)).map_or(0.0, |factor| score.dot(&factor.solve(&score)))
+        squares_along(columns.into_iter().map(|c| self.by_columns.column(c).into_owned()), &self.score)
     }
+}
+
+/// Squares of a score in the space of some directions, of which some may be those of others together: two bodies seen in one image move alike.
+fn squares_along(directions: impl Iterator<Item = DVector<f64>>, score: &DVector<f64>) -> f64 {
+    let mut basis: Vec<DVector<f64>> = Vec::new();
+    for mut own in directions {
+        let least = LEFT * own.norm();
+        // Once more for what rounding left.
+        for _ in 0..2 {
+            basis.iter().for_each(|unit| own.axpy(-unit.dot(&own), unit, 1.0));
+        }
+        let norm = own.norm();
+        if norm > least {
+            basis.push(own / norm);
+        }
+    }
+    basis.iter().map(|unit| unit.dot(score).powi(2)).sum()
 }
 
 /// What of the poses that were seen is looked at: positions and rotations of a tracker have noise of their own.
@@ -90,6 +98,8 @@ pub struct Step {
     pub(super) covariance: DMatrix<f64>,
     /// Fall of the cost, `D`.
     pub(super) fall: f64,
+    /// How many directions of it are told.
+    told: usize,
     /// Share of the squares `R` that this and the other steps of its series explain.
     pub(super) share: f64,
     /// True where it, or one that was found after it, explains most of what was left.
@@ -111,9 +121,15 @@ impl Step {
     /// Length of three components of the change from one on, and its sigma per axis.
     pub(super) fn size(&self, from: usize) -> (f64, f64) {
         let axes = from..(from + 3).min(self.change.len());
+        let axes_count = axes.len() as f64;
         let variance: f64 = axes.clone().map(|k| self.covariance[(k, k)]).sum();
         let square: f64 = axes.map(|k| self.change[k].powi(2)).sum();
-        (square.sqrt(), (variance / 3.0).sqrt())
+        (square.sqrt(), (variance / axes_count).sqrt())
+    }
+
+    /// True where its shift or its turn is beyond so many sigmas per axis.
+    pub(super) fn is_beyond(&self, sigmas: f64) -> bool {
+        (0..self.change.len()).step_by(3).map(|from| self.size(from)).any(|(size, sigma)| size > sigmas * sigma)
     }
 
     /// False where what was found after it took its place: then it is less than noise alone makes of it.
@@ -121,6 +137,15 @@ impl Step {
         let squares = SymmetricFactor::new(&self.covariance).map(|factor| self.change.dot(&factor.solve(&self.change)));
         squares.is_ok_and(|squares| squares > self.change.len() as f64)
     }
+}
+
+/// How noise is counted.
+#[derive(Debug, Clone, Copy)]
+pub struct Chances {
+    /// Number of stops that tell together as much as one whose errors are its own.
+    pub(super) stops_for_one: f64,
+    /// Share of the squares in the direction of a reading from which these count.
+    pub(super) share: f64,
 }
 
 /// The fit, linearised.
@@ -131,13 +156,57 @@ pub struct Linear {
     pub(super) zeros: Vec<Option<usize>>,
     /// The columns that all targets together move, and all sockets, and by how much.
     together: Rc<[DMatrix<f64>; 2]>,
+    /// Prior information on the errors of robot, mountings and placements, by free columns; zero elsewhere.
+    of_errors: Rc<DMatrix<f64>>,
+    /// What every free column is off by from the mean of its prior.
+    errors: DVector<f64>,
+}
+
+/// What is known of the free columns beforehand.
+struct Priors {
+    /// Information on several columns together.
+    together: DMatrix<f64>,
+    /// All information on robot, mountings and placements.
+    of_errors: DMatrix<f64>,
+    /// What every column is off by from the mean of its prior.
+    errors: DVector<f64>,
+}
+
+impl Priors {
+    fn of(Adjustment { problem, state }: &Adjustment) -> Self {
+        let layout = &problem.layout;
+        let free: Vec<usize> = (0..layout.len()).filter(|c| layout.columns[*c].free).collect();
+        let is_error = |place: usize| free[place] < layout.theta_len();
+        let values = state.values(layout);
+        let n = free.len();
+        let mut together = DMatrix::zeros(n, n);
+        for prior in problem.joint_priors() {
+            let place = |c: &usize| free.binary_search(c).ok();
+            for (i, row) in prior.columns.iter().enumerate() {
+                for (k, column) in prior.columns.iter().enumerate() {
+                    if let (Some(row), Some(column)) = (place(row), place(column)) {
+                        together[(row, column)] += prior.information[(i, k)];
+                    }
+                }
+            }
+        }
+        let of_errors = DMatrix::from_fn(n, n, |i, k| {
+            let own = if i == k { layout.columns[free[i]].prior_sigma.powi(-2) } else { 0.0 };
+            if is_error(i) && is_error(k) { own + together[(i, k)] } else { 0.0 }
+        });
+        let errors = DVector::from_fn(n, |k, _| values[free[k]] - layout.columns[free[k]].prior_mean);
+        Self { together, of_errors, errors }
+    }
 }
 
 impl Linear {
     pub(super) fn of(linear: LinearProblem) -> Self {
         let Adjustment { problem, state } = linear.adjustment;
         let lin = linear.lin;
-        let StopInformation { stops: all, information, .. } = StopInformation::of(linear);
+        let StopInformation { stops: all, mut information, .. } = StopInformation::of(linear);
+        let Priors { together: common, of_errors, errors } = Priors::of(linear.adjustment);
+        // Without what is known of several columns together a change would free what the fit holds.
+        information += common;
         let image = |k: usize| {
             let image = &problem.images[lin.images[k]];
             if state.joint_errors[image.stop].is_empty() || state.ties[lin.images[k]].is_free() {
@@ -165,7 +234,8 @@ impl Linear {
         };
         let zeros = (0..robot.chain.readings.len()).map(zero).collect();
         let together = Rc::new([bracket(linear.adjustment), fixture(linear.adjustment)]);
-        Self { rows: all.into_iter().filter_map(row).collect(), information, zeros, together }
+        let rows = all.into_iter().filter_map(row).collect();
+        Self { rows, information, zeros, together, of_errors: Rc::new(of_errors), errors }
     }
 
     /// The columns that a change of several bodies together moves; none of a single one.
@@ -198,6 +268,16 @@ impl Linear {
         of_groups
     }
 
+    /// Squares `P` of the errors of robot, mountings and placements over their priors.
+    fn prior_squares(&self) -> f64 {
+        self.errors.dot(&(self.of_errors.as_ref() * &self.errors))
+    }
+
+    /// Squares `R + P`.
+    fn all_squares(&self, problem: &Problem) -> f64 {
+        self.squares(problem, Part::Pose).iter().sum::<f64>() + self.prior_squares()
+    }
+
     /// Number of free columns.
     pub(super) fn columns(&self) -> usize {
         self.information.ncols()
@@ -215,19 +295,23 @@ impl Linear {
         all
     }
 
-    /// The step that noise explains least, `squares` being those that it may explain. The noise of one joint that has grown with the fault
-    /// of its zero hides it from the squares of all: where a step explains this `share` of those in the direction of its reading, `of_zeros`,
-    /// these count.
+    /// The step that noise explains least. What it leaves of the squares is counted, not what it should leave: where a fall is none of them, it
+    /// explains nothing. `stops_for_one` of them count once. The noise of one joint that has grown with the fault of its zero hides it from the
+    /// squares of all: where a step explains this `share` of those in the direction of its reading, `of_zeros`, these count.
     pub(super) fn best(
         &self,
         problem: &Problem,
         tried: &[Candidate],
-        (squares, of_zeros): (f64, &[Vec<f64>]),
-        share: f64,
+        of_zeros: &[Vec<f64>],
+        Chances { stops_for_one, share }: Chances,
     ) -> Option<Step> {
         let covariance = SymmetricFactor::new(&self.information).ok()?.inverse();
-        let chance = |fall: &Fall| log_chance(fall.cost / squares, squares, fall.told);
-        let mut best = self.least(problem, tried.iter(), &covariance, chance)?;
+        let squares = self.all_squares(problem);
+        let chance = |explained: f64, squares: f64, told| log_chance(explained, squares / stops_for_one, told);
+        let mut best =
+            self.least(problem, tried.iter(), &covariance, |fall| chance(fall.cost / squares, squares, fall.told))?;
+        let (next, _) = self.with(problem, &best)?;
+        best.log_chance = chance(1.0 - next.all_squares(problem) / squares, squares, best.told);
         for (group, of_readings) in of_zeros.iter().enumerate() {
             for (reading, own) in of_readings.iter().enumerate() {
                 let is_own = |c: &&Candidate| c.group == group && c.changed == Changed::Zero(reading);
@@ -238,7 +322,7 @@ impl Linear {
                 }
                 let Some((next, _)) = self.with(problem, &step) else { continue };
                 let left = next.zero_squares(of_zeros.len())[group][reading];
-                step.log_chance = log_chance(1.0 - left / own, *own, 1);
+                step.log_chance = chance(1.0 - left / own, *own, 1);
                 if step.log_chance < best.log_chance {
                     best = step;
                 }
@@ -267,7 +351,7 @@ impl Linear {
         let moved: Vec<(usize, f64)> = candidate.moved().collect();
         let shown = moved.iter().flat_map(|(r, _)| self.rows[*r].of(problem, candidate.changed)).collect();
         let Candidate { changed, order, group, .. } = *candidate;
-        let Fall { cost, change, covariance, .. } = fall;
+        let Fall { cost, change, covariance, told } = fall;
         Some(Step {
             changed,
             order,
@@ -277,6 +361,7 @@ impl Linear {
             change,
             covariance,
             fall: cost,
+            told,
             share: 0.0,
             explains_most: false,
             log_chance,
@@ -350,7 +435,9 @@ impl Linear {
                 by_columns: row.by_columns.clone(),
             })
             .collect();
-        Some((Self { rows, information, zeros: self.zeros.clone(), together: self.together.clone() }, step))
+        let (zeros, together, of_errors) = (self.zeros.clone(), self.together.clone(), self.of_errors.clone());
+        let errors = DVector::from_fn(self.errors.len(), |k, _| self.errors[k] + step[k]);
+        Some((Self { rows, information, zeros, together, of_errors, errors }, step))
     }
 }
 
@@ -401,5 +488,55 @@ impl Sums {
         let covariance = &scaled * DMatrix::from_diagonal(&by_value) * scaled.transpose();
         let change = &covariance * &self.score;
         Some(Fall { cost: self.score.dot(&change), change, covariance, told })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assess::Limits;
+
+    fn along(directions: &[[f64; 3]], score: [f64; 3]) -> f64 {
+        squares_along(directions.iter().map(|d| DVector::from_row_slice(d)), &DVector::from_row_slice(&score))
+    }
+
+    /// Two cameras that miss one plate in opposite directions: the plate tells nothing of it, and the cameras do not count twice with it.
+    #[test]
+    fn what_two_cameras_contradict_each_other_by_is_counted_once() {
+        let plate = [1.0, 1.0, 0.0];
+        let cameras = [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0]];
+        let score = [2.0, -2.0, 5.0];
+        assert!(along(&[plate], score).abs() < 1e-12);
+        assert!((along(&cameras, score) - 8.0).abs() < 1e-12);
+        assert!((along(&[plate, cameras[0], cameras[1]], score) - 8.0).abs() < 1e-12);
+        assert_eq!(along(&[[0.0; 3]], score), 0.0);
+    }
+
+    fn step(change: &[f64], sigmas: &[f64]) -> Step {
+        let variances = DVector::from_row_slice(sigmas).map(|sigma| sigma * sigma);
+        Step {
+            changed: Changed::Instrument(0),
+            order: Order::Time,
+            group: 0,
+            moved: Vec::new(),
+            shown: Vec::new(),
+            change: DVector::from_row_slice(change),
+            covariance: DMatrix::from_diagonal(&variances),
+            fall: 0.0,
+            told: change.len(),
+            share: 0.0,
+            explains_most: false,
+            log_chance: 0.0,
+        }
+    }
+
+    /// Noise alone makes a shift along three axes of 1.6 sigmas.
+    #[test]
+    fn a_step_within_its_own_sigma_is_none() {
+        let sigmas = [1.01e-3, 1.01e-3, 1.01e-3, 0.49e-3, 0.49e-3, 0.49e-3];
+        let most = Limits::default().displaced_sigmas;
+        assert!(!step(&[2.41e-3, 0.0, 0.0, 0.55e-3, 0.0, 0.0], &sigmas).is_beyond(most));
+        assert!(step(&[2.41e-3, 0.0, 0.0, 0.0, 2e-3, 0.0], &sigmas).is_beyond(most));
+        assert!(step(&[-1.5e-3], &[0.1e-3]).is_beyond(most) && !step(&[0.2e-3], &[0.1e-3]).is_beyond(most));
     }
 }
