@@ -26,6 +26,7 @@ mod stops;
 mod truth;
 mod uncertainty;
 mod used_stops;
+mod usual_errors;
 
 pub use advice::Advice;
 pub use alone::urdf_alone;
@@ -46,7 +47,7 @@ pub use near_nominal::{extrapolation_m, restraint};
 pub use pattern_effect::PatternEffect;
 pub use patterns::{Bearer, Pattern, PatternTest, camera_shows_pattern, cause, patterns};
 pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
-pub use points_apart::{DeviceMoved, OddPoints, device_moved, odd_points};
+pub use points_apart::{DeviceMoved, OddPoints, StepCause, device_moved, odd_points};
 pub use points_mistaken::{ReadingMistake, reading_mistake};
 pub use projection::ProjectionMap;
 pub use promise::{FlangeErrors, FlangeIntervals, StopNoise, scatter_m, usual_joint_sigma};

@@ -109,14 +109,14 @@ pub struct ExpectedRms {
     pub with_joint_noise_m: f64,
 }
 
-/// Derivatives of all points, three rows each.
-struct Derivatives {
+/// Derivatives of points, three rows each, in the frame of the device.
+pub(super) struct Derivatives {
     /// By the robot's columns.
-    by_model: DMatrix<f64>,
+    pub by_model: DMatrix<f64>,
     /// By the noise of every reading of every point, in its sigmas.
-    by_noise: DMatrix<f64>,
+    pub by_noise: DMatrix<f64>,
     /// By frame and reflector.
-    fitted: DMatrix<f64>,
+    pub fitted: DMatrix<f64>,
 }
 
 /// Every two points, with every reading.
@@ -198,25 +198,35 @@ impl PointFit {
         let mut by_noise = DMatrix::zeros(3 * n, n * readings);
         let mut fitted = DMatrix::zeros(3 * n, 9);
         for (k, p) in points.iter().enumerate() {
-            let kinematics = robot.kinematics(&Posture::at(&p.readings), &vec![0.0; readings]);
-            let tip = kinematics.base_from_tip;
-            let turned = self.device_from_base.rotation * tip.rotation;
-            let mut moved = Matrix3x6::zeros();
-            moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&turned);
-            moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-turned * skew(&self.tip_point_m)));
-            for (i, d) in kinematics.d_twists.iter().enumerate() {
-                by_model.fixed_view_mut::<3, 6>(3 * k, 6 * i).copy_from(&(moved * d));
-            }
-            let first = 6 * kinematics.d_twists.len();
-            for (i, d) in kinematics.d_terms.iter().enumerate() {
-                by_model.fixed_view_mut::<3, 1>(3 * k, first + i).copy_from(&(moved * d));
-            }
-            for (r, d) in kinematics.d_readings.iter().enumerate() {
-                by_noise.fixed_view_mut::<3, 1>(3 * k, k * readings + r).copy_from(&(moved * d * joint_sigma[r]));
-            }
-            let by = by_frame_and_reflector(&self.device_from_base, &tip, &self.tip_point_m);
-            fitted.fixed_view_mut::<3, 9>(3 * k, 0).copy_from(&by);
+            let of_point = self.derivatives_at(robot, p, joint_sigma);
+            by_model.view_mut((3 * k, 0), (3, columns)).copy_from(&of_point.by_model);
+            by_noise.view_mut((3 * k, k * readings), (3, readings)).copy_from(&of_point.by_noise);
+            fitted.view_mut((3 * k, 0), (3, 9)).copy_from(&of_point.fitted);
         }
         Derivatives { by_model, by_noise, fitted }
+    }
+
+    /// Those of one point.
+    pub(super) fn derivatives_at(&self, robot: &Robot, point: &MeasuredPoint, joint_sigma: &[f64]) -> Derivatives {
+        let kinematics = robot.kinematics(&Posture::at(&point.readings), &vec![0.0; joint_sigma.len()]);
+        let tip = kinematics.base_from_tip;
+        let turned = self.device_from_base.rotation * tip.rotation;
+        let mut moved = Matrix3x6::zeros();
+        moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&turned);
+        moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-turned * skew(&self.tip_point_m)));
+        let first = 6 * kinematics.d_twists.len();
+        let mut by_model = DMatrix::zeros(3, first + kinematics.d_terms.len());
+        for (i, d) in kinematics.d_twists.iter().enumerate() {
+            by_model.fixed_view_mut::<3, 6>(0, 6 * i).copy_from(&(moved * d));
+        }
+        for (i, d) in kinematics.d_terms.iter().enumerate() {
+            by_model.fixed_view_mut::<3, 1>(0, first + i).copy_from(&(moved * d));
+        }
+        let mut by_noise = DMatrix::zeros(3, joint_sigma.len());
+        for (r, (d, sigma)) in kinematics.d_readings.iter().zip(joint_sigma).enumerate() {
+            by_noise.fixed_view_mut::<3, 1>(0, r).copy_from(&(moved * d * *sigma));
+        }
+        let by = by_frame_and_reflector(&self.device_from_base, &tip, &self.tip_point_m);
+        Derivatives { by_model, by_noise, fitted: DMatrix::from_column_slice(3, 9, by.as_slice()) }
     }
 }

@@ -1,11 +1,12 @@
 //! Measured points that do not belong with the others: single ones, or all from some row on.
 
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6, Vector3, Vector6};
 
 use super::Limits;
-use super::points::{MeasuredPoint, PointFit, by_frame_and_reflector, fit_points};
+use super::points::{Derivatives, MeasuredPoint, PointFit, by_frame_and_reflector, fit_points};
 use super::statistics::log_chance;
-use crate::linalg::median;
+use super::usual_errors::usual_errors;
+use crate::linalg::{SymmetricFactor, median};
 use crate::model::robot::Robot;
 
 /// Points that miss by far more than the others.
@@ -53,48 +54,136 @@ pub struct DeviceMoved {
     pub by_m: f64,
     /// What the points leave with a frame before it and one behind it, RMS, m.
     pub rms_m: f64,
+    /// Whether it is no error of the robot.
+    pub cause: StepCause,
+}
+
+/// What a step in points comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StepCause {
+    /// The device, or the base: no errors of links, joints and gears as robots have them explain it.
+    Device,
+    /// Such errors explain it as well, as where the postures before it are others than those behind it.
+    DeviceOrRobot,
 }
 
 /// The device elsewhere from some point on by more than `displaced_m`, where that explains more than `displaced_share` of the squares of the
 /// residuals, and chance does not.
 ///
-/// The fit is linear in a second frame: with `A` the derivatives by it of the points behind the step, what those by frame and reflector take
-/// up projected out, the squares fall by `g' J^-1 g`, `g = A' r`, `J = A' A`.
+/// The fit is linear in a second frame: with `A` the derivatives by it of the points behind the step, what the parameters of the fit take
+/// up projected out, the squares fall by `g' J^-1 g`, `g = A' r`, `J = A' A`. It is asked for beside the errors that robots have, with their
+/// priors and the noise of readings and points (generalised least squares, of which the size of all sigmas is left open); what is found beside
+/// frame and reflector alone may be the robot.
 pub fn device_moved(robot: &Robot, points: &[MeasuredPoint], fit: &PointFit, limits: &Limits) -> Option<DeviceMoved> {
     let by = |p: &MeasuredPoint| {
         by_frame_and_reflector(&fit.device_from_base, &robot.base_from_tip(&p.readings), &fit.tip_point_m)
     };
-    let derivatives: Vec<SMatrix<f64, 3, 9>> = points.iter().map(by).collect();
-    let normal = derivatives.iter().map(|d| d.transpose() * d).sum::<SMatrix<f64, 9, 9>>().cholesky()?;
-    let squares: f64 = fit.residuals_m.iter().map(Vector3::norm_squared).sum();
-    let (mut behind, mut score) = (SMatrix::<f64, 9, 9>::zeros(), SVector::<f64, 9>::zeros());
-    let mut best: Option<(f64, usize, SVector<f64, 6>)> = None;
-    let least = limits.displaced_images;
-    for first in (least..points.len()).rev() {
-        let d = &derivatives[first];
-        behind += d.transpose() * d;
-        score += d.transpose() * fit.residuals_m[first];
-        if points.len() - first < least {
-            continue;
-        }
-        let with_fitted = behind.fixed_rows::<6>(0).into_owned();
-        let own = behind.fixed_view::<6, 6>(0, 0) - with_fitted * normal.solve(&with_fitted.transpose());
-        let score = score.fixed_rows::<6>(0).into_owned();
-        let Some(change) = own.cholesky().map(|factor| factor.solve(&score)) else { continue };
-        let fall = score.dot(&change);
-        if best.as_ref().is_none_or(|(most, ..)| fall > *most) {
-            best = Some((fall, first, change));
-        }
-    }
-    let (fall, first, change) = best?;
-    let share = fall / squares;
-    let left = (3 * points.len()).saturating_sub(9) as f64;
-    let chance = log_chance(share, left, 6) + (points.len() as f64).ln();
-    if share <= limits.displaced_share || chance > limits.displaced_false_alarms.ln() {
-        return None;
-    }
-    let displaced: f64 = derivatives[first..].iter().map(|d| (d.fixed_columns::<6>(0) * change).norm_squared()).sum();
+    let by_frame: Vec<Rows> = points.iter().map(|p| Rows::from_column_slice(9, by(p).as_slice())).collect();
+    let alone = SteppedFit::new(by_frame.clone(), fit.residuals_m.clone())?;
+    let beside_errors = || {
+        let (rows, residuals) = beside_usual_errors(robot, points, fit, limits)?;
+        SteppedFit::new(rows, residuals)?.credible_step(limits)
+    };
+    let (step, cause) = match beside_errors() {
+        Some(step) => (step, StepCause::Device),
+        None => (alone.credible_step(limits)?, StepCause::DeviceOrRobot),
+    };
+    let Step { first, change, .. } = step;
+    let displaced: f64 = by_frame[first..].iter().map(|d| (d.fixed_columns::<6>(0) * change).norm_squared()).sum();
     let by_m = (displaced / (points.len() - first) as f64).sqrt();
-    let rms_m = ((squares - fall).max(0.0) / points.len() as f64).sqrt();
-    (by_m > limits.displaced_m).then_some(DeviceMoved { first, by_m, rms_m })
+    let fall = alone.steps(limits.displaced_images).into_iter().find(|s| s.first == first).map_or(0.0, |s| s.fall);
+    let rms_m = ((alone.squares - fall).max(0.0) / points.len() as f64).sqrt();
+    (by_m > limits.displaced_m).then_some(DeviceMoved { first, by_m, rms_m, cause })
+}
+
+/// Derivatives of a point by frame (6), reflector (3), and what else is fitted, in its sigmas.
+type Rows = Matrix3xX<f64>;
+
+/// Derivatives and residuals of points in units of their noise, those by the errors of a robot among them; `None` where there is no noise.
+fn beside_usual_errors(
+    robot: &Robot,
+    points: &[MeasuredPoint],
+    fit: &PointFit,
+    limits: &Limits,
+) -> Option<(Vec<Rows>, Vec<Vector3<f64>>)> {
+    let (full, sigmas) = usual_errors(robot);
+    let joint_sigma = vec![limits.joint_error_sigma; robot.chain.readings.len()];
+    let (mut all, mut residuals) = (Vec::new(), Vec::new());
+    for (point, residual) in points.iter().zip(&fit.residuals_m) {
+        let Derivatives { by_model, by_noise, fitted } = fit.derivatives_at(&full, point, &joint_sigma);
+        let mut rows = Rows::zeros(9 + sigmas.len());
+        rows.columns_mut(0, 9).copy_from(&fitted);
+        for (k, sigma) in sigmas.iter().enumerate() {
+            rows.column_mut(9 + k).copy_from(&(by_model.column(k) * *sigma));
+        }
+        let noise = Matrix3::from_column_slice((&by_noise * by_noise.transpose()).as_slice());
+        let root = (noise + Matrix3::identity() * limits.displaced_m.powi(2)).cholesky()?.l();
+        all.push(root.solve_lower_triangular(&rows)?);
+        residuals.push(root.solve_lower_triangular(residual)?);
+    }
+    Some((all, residuals))
+}
+
+/// A step of the frame from a point on.
+struct Step {
+    first: usize,
+    /// By how much it lessens the squares.
+    fall: f64,
+    change: Vector6<f64>,
+}
+
+/// Least squares over frame, reflector and errors with unit priors, to which a second frame may be added.
+struct SteppedFit {
+    by: Vec<Rows>,
+    residuals: Vec<Vector3<f64>>,
+    normal: SymmetricFactor,
+    /// Those of the residuals, and of the errors in their sigmas.
+    squares: f64,
+}
+
+impl SteppedFit {
+    fn new(by: Vec<Rows>, residuals: Vec<Vector3<f64>>) -> Option<Self> {
+        let columns = by.first()?.ncols();
+        let (mut normal, mut score) = (DMatrix::zeros(columns, columns), DVector::zeros(columns));
+        (9..columns).for_each(|k| normal[(k, k)] = 1.0);
+        for (d, r) in by.iter().zip(&residuals) {
+            normal.gemm_tr(1.0, d, d, 1.0);
+            score.gemv_tr(1.0, d, r, 1.0);
+        }
+        let normal = SymmetricFactor::new(&normal).ok()?;
+        let found = normal.solve(&score);
+        let residuals: Vec<Vector3<f64>> = by.iter().zip(residuals).map(|(d, r)| r - d * &found).collect();
+        let of_errors = found.rows(9, columns - 9).norm_squared();
+        let squares = residuals.iter().map(Vector3::norm_squared).sum::<f64>() + of_errors;
+        Some(Self { by, residuals, normal, squares })
+    }
+
+    /// Every step with so many points before it and behind it, the last one first.
+    fn steps(&self, least: usize) -> Vec<Step> {
+        let (mut behind, mut score) = (DMatrix::zeros(6, self.by.first().map_or(0, Rows::ncols)), Vector6::zeros());
+        let mut all = Vec::new();
+        for first in (least..self.by.len()).rev() {
+            let of_frame = self.by[first].fixed_columns::<6>(0).into_owned();
+            behind.gemm_tr(1.0, &of_frame, &self.by[first], 1.0);
+            score += of_frame.tr_mul(&self.residuals[first]);
+            if self.by.len() - first < least {
+                continue;
+            }
+            let taken = &behind * self.normal.solve_many(&behind.transpose());
+            let own = behind.columns(0, 6) - taken;
+            let factor = Matrix6::from_column_slice(own.as_slice()).cholesky();
+            let Some(change) = factor.map(|factor| factor.solve(&score)) else { continue };
+            all.push(Step { first, fall: score.dot(&change), change });
+        }
+        all
+    }
+
+    /// The best of them, where it is credible.
+    fn credible_step(&self, limits: &Limits) -> Option<Step> {
+        let best = self.steps(limits.displaced_images).into_iter().max_by(|a, b| a.fall.total_cmp(&b.fall))?;
+        let share = best.fall / self.squares;
+        let left = (3 * self.by.len()).saturating_sub(9) as f64;
+        let chance = log_chance(share, left, 6) + (self.by.len() as f64).ln();
+        (share > limits.displaced_share && chance <= limits.displaced_false_alarms.ln()).then_some(best)
+    }
 }

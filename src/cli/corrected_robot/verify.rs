@@ -12,8 +12,8 @@ use super::verify_series;
 use super::verify_stated::Stated;
 use super::verify_verdict::Reasons;
 use crate::assess::{
-    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, Ratio, ReadingMistake, bootstrap_ratio, by_cluster,
-    device_moved, fit_points, odd_points, reading_mistake,
+    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, Ratio, ReadingMistake, StepCause, bootstrap_ratio,
+    by_cluster, device_moved, fit_points, odd_points, reading_mistake,
 };
 use crate::cli::Verdict;
 use crate::cli::flags::joint_table::{self, Unit};
@@ -100,20 +100,13 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     let expected = stated.as_ref().and_then(|s| Some((s, s.at_points(&model.points, device_m)?)));
     // What the model itself may miss, different in every posture, is no step of the device.
     let may_miss = expected.as_ref().is_some_and(|(_, expected)| model.fit.rms_m <= expected.most_m);
-    let moved = device_moved(&model.robot, &model.points, &model.fit, limits).filter(|_| !may_miss);
-    let odd = if moved.is_none() { odd_points(&model.robot, &model.points, limits) } else { None };
-    moved.iter().for_each(say_moved);
-    odd.iter().for_each(say_odd);
     let mut reasons = Reasons::default();
-    reasons.doubts.extend(odd.as_ref().map(|odd| match odd.points.len() {
-        1 => "one point is wrong, or its readings".to_owned(),
-        count => format!("{count} points are wrong, or their readings"),
-    }));
+    let (is_moved, odd) = apart(&model, may_miss, limits, &mut reasons);
     // Wrong points are none of the robot's errors.
     let rms_m = odd.as_ref().map_or(model.fit.rms_m, |odd| odd.without.rms_m);
     let left_out = odd.as_ref().map_or(&[][..], |odd| &odd.points);
     let different = model.different();
-    if moved.is_some() {
+    if is_moved {
         reasons.against.push("the points do not belong together".into());
     } else if different < limits.scatter_images {
         reasons.against.push(format!(
@@ -132,6 +125,23 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     Ok(reasons.verdict())
+}
+
+/// Whether the device was moved, and points that do not belong with the others: both said, with the doubts that they leave.
+fn apart(model: &Judged, may_miss: bool, limits: &Limits, reasons: &mut Reasons) -> (bool, Option<OddPoints>) {
+    let moved = device_moved(&model.robot, &model.points, &model.fit, limits).filter(|_| !may_miss);
+    let is_moved = moved.is_some_and(|moved| moved.cause == StepCause::Device);
+    let odd = if is_moved { None } else { odd_points(&model.robot, &model.points, limits) };
+    moved.iter().for_each(say_moved);
+    odd.iter().for_each(say_odd);
+    reasons.doubts.extend(odd.as_ref().map(|odd| match odd.points.len() {
+        1 => "one point is wrong, or its readings".to_owned(),
+        count => format!("{count} points are wrong, or their readings"),
+    }));
+    if moved.is_some() && !is_moved {
+        reasons.doubts.push("the points may not belong together".into());
+    }
+    (is_moved, odd)
 }
 
 /// As stated; nothing where it is not.
@@ -201,13 +211,16 @@ fn line(what: &str, urdf: &Path, Judged { fit, .. }: &Judged) -> String {
     format!("{what:<9} {}: {:.3} mm RMS, worst {:.3} mm", urdf.display(), 1e3 * fit.rms_m, 1e3 * worst)
 }
 
-fn say_moved(DeviceMoved { first, by_m, rms_m }: &DeviceMoved) {
-    say_line!(
-        "moved     the device, or the base, stands {:.1} mm elsewhere from row {} on (without that {:.3} mm RMS): judge the rows before and after alone",
-        1e3 * by_m,
-        first + 1,
-        1e3 * rms_m
-    );
+fn say_moved(DeviceMoved { first, by_m, rms_m, cause }: &DeviceMoved) {
+    let [by_mm, rms_mm, row] = [format!("{:.1}", 1e3 * by_m), format!("{:.3}", 1e3 * rms_m), (first + 1).to_string()];
+    match cause {
+        StepCause::Device => say_line!(
+            "moved     the device, or the base, stands {by_mm} mm elsewhere from row {row} on (without that {rms_mm} mm RMS): judge the rows before and after alone"
+        ),
+        StepCause::DeviceOrRobot => say_line!(
+            "moved?    from row {row} on the points are {by_mm} mm elsewhere (without that {rms_mm} mm RMS), which errors of the robot explain as well: judge the rows before and after alone, or measure in another order"
+        ),
+    }
 }
 
 fn say_odd(OddPoints { points, off_m, without }: &OddPoints) {
