@@ -101,12 +101,14 @@ pub(super) fn by_frame_and_reflector(
 }
 
 /// What a fit of points should leave, by the covariance of the model.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedRms {
     /// From the uncertainty of the model alone, m.
     pub model_m: f64,
     /// With the joint noise of every stop, m.
     pub with_joint_noise_m: f64,
+    /// Mean squares of what the noise of every reading adds, m^2.
+    pub by_reading: Vec<f64>,
 }
 
 /// Derivatives of points, three rows each, in the frame of the device.
@@ -148,10 +150,15 @@ impl PointFit {
         let (model, noise) = (left(&d.by_model), left(&d.by_noise));
         let n = points.len() as f64;
         let of_model = product(&model, covariance).component_mul(&model).sum() / n;
-        let of_noise = noise.norm_squared() / n;
+        let readings = joint_sigma.len();
+        let of_reading =
+            |r: usize| (0..points.len()).map(|k| noise.column(k * readings + r).norm_squared()).sum::<f64>();
+        let by_reading: Vec<f64> = (0..readings).map(|r| of_reading(r) / n).collect();
+        let of_noise: f64 = by_reading.iter().sum();
         Some(ExpectedRms {
             model_m: of_model.max(0.0).sqrt(),
             with_joint_noise_m: (of_model + of_noise).max(0.0).sqrt(),
+            by_reading,
         })
     }
 

@@ -76,6 +76,14 @@ pub fn root_mean_square(units: &[(f64, f64)]) -> f64 {
     (s / w).sqrt()
 }
 
+/// Upper end of the 95 % interval of a sum of independent variances, each with the upper end of its own: `s + sqrt(sum_i (u_i - s_i)^2)`
+/// (F. Graybill, C.-M. Wang, *Confidence intervals on nonnegative linear combinations of variances*, 1980).
+pub fn most_of_sum(parts: impl IntoIterator<Item = [f64; 2]>) -> f64 {
+    let (sum, squares) =
+        parts.into_iter().fold((0.0, 0.0), |(sum, squares), [s, most]| (sum + s, squares + (most - s).powi(2)));
+    sum + squares.sqrt()
+}
+
 /// Logarithm of the probability that so many parameters explain this share of so many squares or more, of Gaussian noise; of an odd number
 /// of parameters a bound, that of one more.
 pub fn log_chance(share: f64, squares: f64, parameters: usize) -> f64 {
@@ -135,6 +143,13 @@ mod tests {
         let (few, many) = (width(20), width(320));
         assert!(many < 0.4 * few, "{few} {many}");
         assert_eq!(bootstrap_ratio(&[], &[]), None);
+    }
+
+    #[test]
+    fn the_upper_end_of_a_sum_is_that_of_its_only_part_and_less_than_the_sum_of_all() {
+        assert!((most_of_sum([[2.0, 5.0]]) - 5.0).abs() < 1e-12);
+        assert!((most_of_sum([[2.0, 5.0], [0.0, 4.0]]) - 7.0).abs() < 1e-12);
+        assert!(most_of_sum([]) == 0.0);
     }
 
     #[test]

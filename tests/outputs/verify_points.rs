@@ -360,3 +360,53 @@ fn points_that_a_model_misses_by_more_than_its_solution_states_are_no_good_verdi
     std::fs::write(folder.path().join("compensation.toml"), "[joint.joint_a2]\ngear_scale = 0.0001\n").unwrap();
     assert_eq!(judged(&copy, &right, &[]), (Some(0), vec![Code::CompensationNotGiven]));
 }
+
+/// The mean and the most that the solution of the shipped report states at points, mm, as it is or with this upper end of the intervals of its joint noise.
+fn stated_with_noise_up_to(points: &Path, most: Option<&serde_json::Value>) -> [f64; 2] {
+    let report = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/kr6_small");
+    let folder = tempfile::tempdir().unwrap();
+    let own = |name: &str| folder.path().join(name);
+    for name in ["kuka_kr6_r900.calibrated.urdf", "compensation.toml"] {
+        std::fs::copy(report.join(name), own(name)).unwrap();
+    }
+    let mut record: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(report.join("solution.json")).unwrap()).unwrap();
+    let intervals = record["series"][0]["noise"]["joint_interval"].as_array_mut().unwrap();
+    assert_eq!(intervals.len(), 6);
+    most.into_iter().for_each(|most| intervals.iter_mut().for_each(|interval| interval[1] = most.clone()));
+    std::fs::write(own("solution.json"), serde_json::to_vec(&record).unwrap()).unwrap();
+    let mut command = Command::cargo_bin("robotcal").unwrap();
+    command.args(["verify", "--joint-unit", "rad", "--urdf"]).arg(own("kuka_kr6_r900.calibrated.urdf"));
+    let found =
+        command.arg("--compensation").arg(own("compensation.toml")).arg("--points").arg(points).output().unwrap();
+    let text = String::from_utf8(found.stdout).unwrap();
+    println!("{text}{}", String::from_utf8_lossy(&found.stderr));
+    assert_eq!((found.status.code(), codes(&text)), (Some(0), vec![]));
+    let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let number = |after: &str| -> f64 {
+        let (_, rest) = words.split_once(after).unwrap();
+        rest.split_whitespace().next().unwrap().parse().unwrap()
+    };
+    [number("its solution states "), number(" mm here, at most ")]
+}
+
+/// Joint noise that a fit found at zero may still be there.
+#[test]
+fn the_most_that_a_solution_states_at_points_has_the_doubt_of_its_joint_noise_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let points = measured_by_a_tracker(folder.path(), 0.0);
+    let [rms, most] = stated_with_noise_up_to(&points, None);
+    assert!(most > rms);
+    let added = |upper: &serde_json::Value| {
+        let [same, larger] = stated_with_noise_up_to(&points, Some(upper));
+        assert!((same - rms).abs() < 1e-9, "what is expected stays: {same}, {rms}");
+        (larger.powi(2) - most.powi(2)).sqrt()
+    };
+    // Of six readings, that do together what one does with a lever of a metre: 0.2 mm where all are at their upper ends at once, and that over
+    // the root of six at least.
+    let with_doubt = added(&2e-4.into());
+    assert!((0.06..0.25).contains(&with_doubt), "{with_doubt} mm");
+    // An upper end that is not told is that of a robot in order, 0.5 mrad.
+    let untold = added(&serde_json::Value::Null);
+    assert!((untold / with_doubt - 2.5).abs() < 0.1, "{untold} mm");
+}

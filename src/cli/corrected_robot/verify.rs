@@ -25,6 +25,9 @@ use crate::output::compensated;
 use crate::output::restore::add;
 use crate::urdf::Chain;
 
+/// Said where a solution says what to expect, and nothing is said of the device.
+const EXACT: &str = "; they count as exact: --point-sigma-m tells what they scatter by";
+
 pub fn run(args: &VerifyArgs) -> Result<Verdict> {
     match (&args.points, args.joint_unit) {
         (Some(file), Some(unit)) => points(args, file, unit),
@@ -87,7 +90,8 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     refuse_mistaken(&model, &args.urdf, file, limits)?;
     refuse_far(&model, &args.urdf, file, limits)?;
     let count = model.points.len();
-    say_line!("points    {count} of {}; frame of the device and reflector fitted", file.display());
+    let exact = if stated.is_some() && args.point_sigma_m.is_none() { EXACT } else { "" };
+    say_line!("points    {count} of {}; frame of the device and reflector fitted{exact}", file.display());
     zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
     say_line!("{}", line("model", &args.urdf, &model));
     let nominal = args.nominal.as_ref().map(|urdf| {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector6;
 
 use super::compensate_frames::{Side, solution};
-use crate::assess::{Limits, MeasuredPoint, NORMAL_95, PredictedFlange, fit_points, root_mean_square};
+use crate::assess::{Limits, MeasuredPoint, NORMAL_95, PredictedFlange, fit_points, most_of_sum, root_mean_square};
 use crate::cli::results::show::read_solution;
 use crate::model::robot::{Posture, Robot};
 use crate::output::ALONE;
@@ -80,7 +80,10 @@ impl Stated {
             twists.iter().zip(&at).map(length).collect::<Vec<_>>()
         });
         let [model_m, lacking_m] = [rms(of_model), rms(lacking)];
-        let expected = self.expectation((model_m, lacking_m), self.record.flange?.scatter_m)?;
+        // The stated scatter stands for that at the stops.
+        let [at_stops_m, most_m] = self.scatter_m(&by_readings(&self.found.robot, &stops), stops.len());
+        let scatter_m = self.record.flange?.scatter_m;
+        let expected = self.expectation((model_m, lacking_m), [scatter_m, scatter_m + (most_m - at_stops_m)])?;
         // What was found for images that the fit had not seen is of this kind.
         let held_out_m = 1e-3 * self.record.accuracy.calibrated.rms_mm;
         let most_m = if held_out_m.is_finite() { expected.most_m.max(held_out_m) } else { expected.most_m };
@@ -91,8 +94,9 @@ impl Stated {
     pub fn at_points(&self, points: &[MeasuredPoint], device_m: f64) -> Option<Expectation> {
         let known = self.found.known_robot(None).ok()?;
         let robot = &self.found.robot;
-        let left = fit_points(robot, points)?.expected(robot, points, known.covariance(), &self.found.joint_sigma)?;
-        let scatter_m = (left.with_joint_noise_m.powi(2) - left.model_m.powi(2)).max(0.0).sqrt();
+        let unit = vec![1.0; self.found.joint_sigma.len()];
+        let left = fit_points(robot, points)?.expected(robot, points, known.covariance(), &unit)?;
+        let scatter_m = self.scatter_m(&left.by_reading, points.len());
         let lacking_m = self.part.as_ref().map_or(Some(0.0), |part| {
             let on_tip = fit_points(robot, points)?.tip_point_m;
             let of_whole = |p: &MeasuredPoint| MeasuredPoint {
@@ -110,12 +114,24 @@ impl Stated {
         Some(Expectation { rms_m: expected.rms_m.hypot(device_m), most_m: expected.most_m.hypot(most_m) })
     }
 
-    /// Of the errors of the model, what a part of it lacks, and the scatter of single stops.
-    fn expectation(&self, (model_m, lacking_m): (f64, f64), scatter_m: f64) -> Option<Expectation> {
+    /// What joint noise does, RMS over so many stops, and the upper end of its 95 % interval, m: by the mean squares that unit noise of every
+    /// reading makes, m^2. How large the noise is, is known to its interval; how it falls at these stops, as of one degree of freedom a stop.
+    fn scatter_m(&self, by_reading: &[f64], stops: usize) -> [f64; 2] {
+        let FoundModel { joint_sigma, joint_most, .. } = &self.found;
+        let parts = || by_reading.iter().zip(joint_sigma.iter().zip(joint_most));
+        let square: f64 = parts().map(|(by, (sigma, _))| by * sigma.powi(2)).sum();
+        let chance = NORMAL_95 * (2.0 / stops.max(1) as f64).sqrt() * square;
+        let each = parts().map(|(by, (sigma, most))| [by * sigma.powi(2), by * most.powi(2)]);
+        [square, most_of_sum(each.chain([[0.0, chance]]))].map(f64::sqrt)
+    }
+
+    /// Of the errors of the model, what a part of it lacks, and the scatter of single stops with the upper end of its interval.
+    fn expectation(&self, (model_m, lacking_m): (f64, f64), scatter_m: [f64; 2]) -> Option<Expectation> {
         let flange = self.record.flange?;
         let widening = flange.intervals.map_or(NORMAL_95, |i| i.model_m[1] / flange.model_m);
-        let with = |model_m: f64| model_m.hypot(scatter_m).hypot(lacking_m);
-        let found = Expectation { rms_m: with(model_m), most_m: with(widening * model_m) };
+        let with = |model_m: f64, scatter_m: f64| model_m.hypot(scatter_m).hypot(lacking_m);
+        let [scatter_m, most_scatter_m] = scatter_m;
+        let found = Expectation { rms_m: with(model_m, scatter_m), most_m: with(widening * model_m, most_scatter_m) };
         (found.rms_m > 0.0 && found.most_m.is_finite()).then_some(found)
     }
 
@@ -147,6 +163,16 @@ fn is_input(record: &SolutionRecord, file: &InputFile) -> bool {
 fn rms(lengths: impl Iterator<Item = f64>) -> f64 {
     let squares: Vec<(f64, f64)> = lengths.map(|m| (m * m, 1.0)).collect();
     if squares.is_empty() { 0.0 } else { root_mean_square(&squares) }
+}
+
+/// Mean squares of the displacement of the tip by unit errors of every reading at stops, m^2.
+fn by_readings(robot: &Robot, stops: &[Posture]) -> Vec<f64> {
+    let mut sums = vec![0.0; robot.chain.readings.len()];
+    for stop in stops {
+        let by = robot.kinematics(stop, &vec![0.0; stop.readings.len()]).d_readings;
+        sums.iter_mut().zip(&by).for_each(|(sum, d)| *sum += d.fixed_rows::<3>(0).norm_squared());
+    }
+    sums.into_iter().map(|sum| sum / stops.len().max(1) as f64).collect()
 }
 
 /// How the tip of a second robot stands to that of a first one, without what a tool takes up: body twists.

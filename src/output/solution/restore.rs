@@ -5,6 +5,7 @@ use std::path::Path;
 use nalgebra::{DMatrix, Vector3, Vector6};
 
 use super::bodies_record::first_instrument;
+use super::series_record::StopNoise;
 use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
 use crate::assess::{FlangeModel, Limits, usual_joint_sigma};
 use crate::error::{Code, Error, Result};
@@ -187,6 +188,8 @@ pub struct FoundModel {
     pub stops: Vec<Posture>,
     /// Joint noise of a stop, root mean square over the series, rad or m.
     pub joint_sigma: Vec<f64>,
+    /// Upper ends of its 95 % intervals, rad or m: no more than no robot in order has, and the noise itself where it counts as known.
+    pub joint_most: Vec<f64>,
     /// Numbers that decide.
     pub limits: Limits,
 }
@@ -299,7 +302,8 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     let still = still.or_else(of_instrument);
     Ok(FoundModel {
         limits: record.limits(),
-        joint_sigma: joint_sigma(record),
+        joint_sigma: of_readings(record, |noise| noise.joint.clone()),
+        joint_most: of_readings(record, |noise| most_noise(noise, &record.limits())),
         covariance: DMatrix::from_fn(n, n, at),
         stops: used().filter_map(stop).chain(record.bodies.postures()).collect(),
         robot: robot.without_local_errors(),
@@ -308,15 +312,21 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     })
 }
 
-/// Joint noise of the series, of the cameras in files that know it of them only.
-fn joint_sigma(record: &SolutionRecord) -> Vec<f64> {
-    let of_series: Vec<Vec<f64>> =
-        record.series.iter().filter_map(|s| s.noise.as_ref()).map(|n| n.joint.clone()).collect();
-    let of_cameras = || record.cameras.iter().map(|c| c.joint_noise.clone()).collect::<Vec<_>>();
-    let all = if of_series.is_empty() { of_cameras() } else { of_series };
+/// A number of each reading from every series, root mean square; of the cameras in files that know the noise of them only.
+fn of_readings(record: &SolutionRecord, of: impl Fn(&StopNoise) -> Vec<f64>) -> Vec<f64> {
+    let all: Vec<Vec<f64>> = record.stop_noise().iter().map(|(_, noise)| of(noise)).collect();
     let readings = record.robot.readings.len();
     let found = usual_joint_sigma(&all);
     if found.len() == readings { found } else { vec![0.0; readings] }
+}
+
+/// Upper ends of the intervals of joint noise.
+fn most_noise(noise: &StopNoise, limits: &Limits) -> Vec<f64> {
+    let most = |(r, sigma): (usize, &f64)| match noise.joint_interval.get(r) {
+        Some([_, most]) => most.unwrap_or(f64::INFINITY).min(limits.unusual_joint_noise).max(*sigma),
+        None => *sigma,
+    };
+    noise.joint.iter().enumerate().map(most).collect()
 }
 
 impl FoundModel {
