@@ -378,8 +378,9 @@ pub struct InnerOuter {
 
 impl InnerOuter {
     /// The mean difference is significant (4 sigma), larger than 0.005 px, and larger than a twentieth of what geometry explains
-    /// (which is not explained better than that): the point spread is asymmetric. The part along the radius does not count: close
-    /// and wide views leave some of it, because the map around a marker knows nothing of the third order of the lens.
+    /// (which is not explained better than that): the point spread is asymmetric. The standard error holds how well each difference is
+    /// explained. The part along the radius does not count: close and wide views leave some of it, because the map around a marker
+    /// knows nothing of the third order of the lens.
     pub fn asymmetric(&self) -> bool {
         self.drift.mean_exceeds(0.005_f64.max(0.05 * self.explained_px))
     }
