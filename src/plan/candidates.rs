@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use nalgebra::Vector3;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -260,6 +261,8 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
         return Error::new(Code::PlanViewless, "plan: views", what, remedy);
     }
     let arm = setting.robot.chain.arm_length_m();
+    let foot = setting.robot.chain.base_from_foot().unwrap_or_else(Pose::identity).translation;
+    let stands = if foot == Vector3::zeros() { "base" } else { "foot of the robot" };
     let axes = setting.robot.chain.readings.len();
     if tally.out_of_reach + tally.unseen == tally.views && axes < 6 {
         let what =
@@ -271,18 +274,18 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
         let (thing, distance, remedy) = match setting.mount {
             CameraMount::Hand => (
                 "plate",
-                setting.placements.iter().map(|p| p.1.translation.norm()).fold(0.0, f64::max),
+                setting.placements.iter().map(|p| (p.1.translation - foot).norm()).fold(0.0, f64::max),
                 format!(
-                    "put the plate (--plate-pose) nearer, about {:.2} m from the base with its face up and towards the robot, \
+                    "put the plate (--plate-pose) nearer, about {:.2} m from the {stands} with its face up and towards the robot, \
                      or check --hand-camera",
                     0.55 * arm
                 ),
             ),
             CameraMount::Fixed => (
                 "camera",
-                setting.mounting.translation.norm(),
+                (setting.mounting.translation - foot).norm(),
                 format!(
-                    "put the camera (--hand-camera) where its view, {:.2} to {:.2} m long, ends about {:.2} m from the base (its z \
+                    "put the camera (--hand-camera) where its view, {:.2} to {:.2} m long, ends about {:.2} m from the {stands} (its z \
                      looks along the view), allow other distances (--distance-m), or check --plate-pose on the flange",
                     options.views.near_m,
                     options.views.far_m,
@@ -291,7 +294,7 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
             ),
         };
         let what = format!(
-            "none of {} workable views is in reach: the {thing} stands {distance:.2} m from the base, the arm is {arm:.2} m long",
+            "none of {} workable views is in reach: the {thing} stands {distance:.2} m from the {stands}, the arm is {arm:.2} m long",
             tally.out_of_reach
         );
         return Error::new(Code::PlanOutOfReach, format!("plan: {thing}"), what, remedy);

@@ -95,12 +95,14 @@ fn plate_box(plate: &Plate) -> OrientedBox {
 /// Capsules along the links, from each moving joint to the next and to the tip, where `described` has none.
 fn along_links(robot: &Robot, radius_m: f64, described: &[Capsule]) -> Vec<Capsule> {
     let joints = &robot.chain.joints;
+    let foot = robot.chain.base_from_foot().map_or_else(Vector3::zeros, |foot| foot.translation);
     let mut all = Vec::new();
     let (mut carrier, mut order, mut end) = (None, 0, Pose::identity());
     let mut close = |carrier: Option<usize>, order: usize, end: &Pose| {
         let name = carrier.map_or("base".to_owned(), |k: usize| format!("link after {}", joints[k].name));
         if !described.iter().any(|c| c.order == order) {
-            let ends_m = [Vector3::zeros(), end.translation];
+            let start = if carrier.is_none() { foot } else { Vector3::zeros() };
+            let ends_m = [start, end.translation];
             all.push(Capsule { name, joint: carrier, order, ends_m, radius_m });
         }
     };
@@ -126,6 +128,12 @@ pub fn described(capsules: &[CarriedCapsule], chain: &Chain) -> Vec<Capsule> {
         radius_m: c.radius_m,
     };
     capsules.iter().map(one).collect()
+}
+
+/// Height below which a robot does not reach as it stands, in the base frame, m: that of its foot, or, where it leans, of the arm that hangs from it.
+fn floor_m(chain: &Chain) -> f64 {
+    let stands = |foot: Pose| foot.translation.z - (1.0 - foot.rotation[(2, 2)]) * chain.arm_length_m();
+    chain.base_from_foot().map_or(0.0, stands)
 }
 
 impl Scene {
@@ -161,7 +169,7 @@ impl Scene {
             }
         }
         boxes.extend(options.boxes.iter().enumerate().map(|(k, b)| (format!("box {}", k + 1), *b)));
-        let lowest = plates.iter().flat_map(|p| p.corners()).map(|c| c.z).fold(0.0, f64::min);
+        let lowest = plates.iter().flat_map(|p| p.corners()).map(|c| c.z).fold(floor_m(&robot.chain), f64::min);
         let pairs = compared(&capsules, options.clearance_m);
         Self {
             robot: robot.clone(),

@@ -22,12 +22,15 @@ const LEAST_SHARE: f64 = 0.15;
 const BELOW_TABLE_M: f64 = 0.05;
 
 /// Poses of camera and plates, nominal and true alike, and what is needed to find postures.
+#[derive(Clone)]
 pub(super) struct Setup {
     /// `flange_from_camera` or `base_from_camera`.
     pub camera: Pose,
     /// `base_from_plate` or `flange_from_plate`, one for each placement.
     pub plates: Vec<Pose>,
     limits: Vec<(f64, f64)>,
+    /// `base_from_foot` of a robot that stands aside of its base.
+    foot: Option<Pose>,
     /// The robot up to each of its moving joints.
     stumps: Vec<Robot>,
 }
@@ -37,14 +40,15 @@ pub(super) fn set_up(request: &WorldRequest, robot: &Robot, rng: &mut impl Rng) 
     let limits = inverse::reading_limits(&request.chain);
     let in_hand = near([0.03, -0.05, 0.08], [0.05, -0.04, 0.4], rng);
     let plate_in_hand = near([0.01, 0.02, 0.05], [0.02, -0.03, 0.3], rng);
-    let mut setup = Setup { camera: in_hand, plates: Vec::new(), limits, stumps: stumps(robot) };
+    let foot = request.chain.base_from_foot();
+    let mut setup = Setup { camera: in_hand, plates: Vec::new(), limits, foot, stumps: stumps(robot) };
     let reach = robot.chain.arm_length_m().max(0.2);
     if request.mount == CameraMount::Fixed {
         setup.plates = vec![plate_in_hand; request.placements.max(1)];
         for plate in setup.plates.iter_mut().skip(1) {
             *plate = *plate * near([0.0, 0.0, 0.02], [0.2, 0.3, 0.8], rng);
         }
-        let candidates = fixed_cameras(reach);
+        let candidates = setup.around_foot(fixed_cameras(reach));
         setup.camera =
             best(&candidates, request, robot, rng, |c| Setup { camera: *c, ..setup.clone_with(&setup.plates) })?;
         return Ok(setup);
@@ -52,7 +56,7 @@ pub(super) fn set_up(request: &WorldRequest, robot: &Robot, rng: &mut impl Rng) 
     for k in 0..request.placements.max(1) {
         let candidates = match request.chain.base_moves() {
             true => plates_on_the_link(k, rng),
-            false => plates_on_tables(reach, k, rng),
+            false => setup.around_foot(plates_on_tables(reach, k, rng)),
         };
         let plate = best(&candidates, request, robot, rng, |c| setup.clone_with(&[*c]))?;
         setup.plates.push(plate);
@@ -143,7 +147,18 @@ fn best(
 
 impl Setup {
     fn clone_with(&self, plates: &[Pose]) -> Self {
-        Self { camera: self.camera, plates: plates.to_vec(), limits: self.limits.clone(), stumps: self.stumps.clone() }
+        Self { plates: plates.to_vec(), ..self.clone() }
+    }
+
+    /// Poses about the robot's foot in the base frame.
+    fn around_foot(&self, poses: Vec<Pose>) -> Vec<Pose> {
+        let Some(foot) = self.foot else { return poses };
+        poses.into_iter().map(|pose| foot * pose).collect()
+    }
+
+    /// Height of a pose in the base frame above the robot's foot, as the foot stands, m.
+    fn height_m(&self, pose: &Pose) -> f64 {
+        self.foot.map_or(pose.translation.z, |foot| (foot.inverse() * *pose).translation.z)
     }
 
     /// The camera pose that a pose of the tip gives.
@@ -167,14 +182,14 @@ impl Setup {
         };
         let readings = inverse::solve(robot, &self.limits, &base_from_tip, STARTS, rng)?;
         let table = match request.mount {
-            CameraMount::Hand => plate.translation.z.min(0.0),
+            CameraMount::Hand => self.height_m(plate).min(0.0),
             CameraMount::Fixed => 0.0,
         };
         // No table stands still beside a base that moves.
         if request.chain.base_moves() {
             return Some(readings);
         }
-        let above = |stump: &Robot| stump.base_from_tip(&readings).translation.z > table - BELOW_TABLE_M;
+        let above = |stump: &Robot| self.height_m(&stump.base_from_tip(&readings)) > table - BELOW_TABLE_M;
         self.stumps.iter().all(above).then_some(readings)
     }
 }

@@ -148,6 +148,14 @@ impl Chain {
         joints.map(|j| j.origin.translation.norm()).sum()
     }
 
+    /// Where the link stands that carries the first moving joint, `base_from_foot`: what is fixed before it is no part of the arm. `None` where
+    /// that link is the base itself, and where the base moves.
+    pub fn base_from_foot(&self) -> Option<Pose> {
+        let fixed = self.joints.iter().take_while(|j| j.kind == JointKind::Fixed).count();
+        let is_apart = fixed > 0 && fixed < self.joints.len() && !self.base_moves();
+        is_apart.then(|| self.joints[..fixed].iter().fold(Pose::identity(), |pose, j| pose * j.origin))
+    }
+
     /// True where camera and plate are both carried: the base moves, too.
     pub fn base_moves(&self) -> bool {
         self.joints.iter().any(|j| !j.states_origin())

@@ -297,6 +297,25 @@ fn a_plan_is_a_series_without_images_with_programs_and_a_page() {
     assert_eq!(read("joints.csv"), stops);
 }
 
+/// The place of the plate is chosen about the robot, not about its base, and measured from there.
+#[test]
+fn a_robot_that_stands_aside_of_its_base_is_planned_for_where_it_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    let plate = plate_file(folder.path());
+    let (aside, out) = (folder.path().join("aside.urdf"), folder.path().join("plan"));
+    let stand = "<link name=\"world\"/><joint name=\"stand\" type=\"fixed\"><parent link=\"world\"/><child link=\"base_link\"/>\
+                 <origin xyz=\"1 2 0.5\"/></joint><link name=\"base_link\"/>";
+    let text = std::fs::read_to_string(urdf("kuka_kr6_r900")).unwrap();
+    std::fs::write(&aside, text.replacen("<link name=\"base_link\"/>", stand, 1)).unwrap();
+    let base = ["plan", "--urdf", aside.to_str().unwrap(), "--base", "world", "--plate", plate.to_str().unwrap()];
+    let base = [&base[..], &["--count", "12", "--candidates", "160", "--out", out.to_str().unwrap()]].concat();
+    let (code, _, error) = run(&[&base[..], &["--plate-pose", "1,2,3.5,0,0,0"]].concat());
+    assert_eq!(code, 3, "{error}");
+    assert_says(&error, Code::PlanOutOfReach, &["3.00 m", "--plate-pose"]);
+    let (code, _, error) = run(&base);
+    assert_eq!(code, 0, "{error}");
+}
+
 #[test]
 fn impossible_wishes_say_why_and_what_to_change() {
     let folder = tempfile::tempdir().unwrap();

@@ -17,9 +17,12 @@ use robotcal::urdf::{self, Chain};
 
 const ROBOTS: [&str; 3] = ["kuka_kr6_r900", "ur10e", "lbr_iiwa_14"];
 
+fn file(name: &str) -> PathBuf {
+    [env!("CARGO_MANIFEST_DIR"), "robots", name, &format!("{name}.urdf")].iter().collect()
+}
+
 fn chain(name: &str) -> Chain {
-    let file: PathBuf = [env!("CARGO_MANIFEST_DIR"), "robots", name, &format!("{name}.urdf")].iter().collect();
-    urdf::read(&file).unwrap().chain(None, None).unwrap()
+    urdf::read(&file(name)).unwrap().chain(None, None).unwrap()
 }
 
 fn small_plate() -> Plate {
@@ -34,6 +37,22 @@ fn small(name: &str, seed: u64) -> WorldRequest {
 fn si_readings(made: &SimulatedSeries, stop: usize) -> Vec<f64> {
     let factor = made.manifest.joint_unit.unwrap().in_rad();
     made.stops.stops[stop].raw_readings.as_ref().unwrap().iter().map(|q| q * factor).collect()
+}
+
+/// The small robot behind a fixed joint, from a base link of its own.
+fn aside(origin: &str) -> Chain {
+    let text = std::fs::read_to_string(file("kuka_kr6_r900")).unwrap();
+    let joint = format!(
+        "<link name=\"world\"/><joint name=\"stand\" type=\"fixed\"><parent link=\"world\"/><child link=\"base_link\"/>{origin}</joint>"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("aside.urdf");
+    std::fs::write(
+        &path,
+        text.replacen("<link name=\"base_link\"/>", &format!("{joint}<link name=\"base_link\"/>"), 1),
+    )
+    .unwrap();
+    urdf::read(&path).unwrap().chain(Some("world"), None).unwrap()
 }
 
 /// The camera poses in the truth follow from readings, joint noise and everything else in the truth.
@@ -54,6 +73,34 @@ fn assert_consistent(made: &SimulatedSeries, chain: &Chain) {
     for held_out in &made.truth.held_out {
         let (angle, distance) = robot.base_from_tip(&held_out.readings).distance(&held_out.base_from_tip.pose());
         assert!(angle < 1e-12 && distance < 1e-12);
+    }
+}
+
+/// What is fixed before the first moving joint is no part of the arm: camera and plates stand about the robot, not about its base.
+#[test]
+fn a_robot_that_stands_aside_of_its_base_or_hangs_has_its_plates_with_it() {
+    let upright = chain("kuka_kr6_r900");
+    assert!(upright.base_from_foot().is_none());
+    for origin in ["<origin xyz=\"1 2 0.5\" rpy=\"0 0 1\"/>", "<origin xyz=\"-3 0 2.5\" rpy=\"3.14159265358979 0 0\"/>"]
+    {
+        let chain = aside(origin);
+        assert_eq!(chain.arm_length_m(), upright.arm_length_m());
+        let foot = chain.base_from_foot().unwrap();
+        for mount in [CameraMount::Hand, CameraMount::Fixed] {
+            let request = WorldRequest { chain: chain.clone(), mount, placements: 2, ..small("kuka_kr6_r900", 11) };
+            let made = series(&request).unwrap_or_else(|e| panic!("{origin} {mount:?}: {e}"));
+            assert_consistent(&made, &chain);
+            let places = match mount {
+                CameraMount::Hand => made.truth.plate_poses.values().map(|p| p.pose()).collect(),
+                CameraMount::Fixed => vec![made.truth.camera_pose.pose()],
+            };
+            for place in places {
+                let seen = foot.inverse() * place;
+                let far = seen.translation.xy().norm() / chain.arm_length_m();
+                assert!((0.39..1.11).contains(&far), "{origin} {mount:?}: {far}");
+                assert!((-1e-9..0.61).contains(&(seen.translation.z / chain.arm_length_m())), "{origin} {mount:?}");
+            }
+        }
     }
 }
 

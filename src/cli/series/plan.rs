@@ -241,6 +241,13 @@ fn noise_word(request: &PlanRequest) -> Option<String> {
     })
 }
 
+/// A place for a plate before the robot in the base frame, so many lengths of its arm from its foot and above it, tilted towards it.
+fn before_robot(chain: &Chain, far: f64, high: f64, tilt_deg: f64) -> Pose {
+    let arm = chain.arm_length_m();
+    let place = Pose::from_xyz_rpy([far * arm, 0.0, high * arm], [0.0, -tilt_deg.to_radians(), 0.0]);
+    chain.base_from_foot().map_or(place, |foot| foot * place)
+}
+
 /// Candidates when places are compared before the plan.
 const TRIAL_CANDIDATES: usize = 600;
 
@@ -250,17 +257,20 @@ fn settle_place(args: &PlanArgs, request: &mut PlanRequest) -> Result<Vec<String
     if !free {
         return Ok(Vec::new());
     }
-    let arm = request.setting.robot.chain.arm_length_m();
+    let chain = &request.setting.robot.chain;
+    let arm = chain.arm_length_m();
+    let of = chain.base_from_foot().map_or("", |_| " from the foot of the robot");
     let place = |name: &str, far: f64, high: f64, tilt_deg: f64| {
-        let pose = Pose::from_xyz_rpy([far * arm, 0.0, high * arm], [0.0, -tilt_deg.to_radians(), 0.0]);
-        (format!("{name} (x {:.2} m, z {:.2} m, tilted {tilt_deg:.0} degrees)", far * arm, high * arm), pose)
+        let pose = before_robot(chain, far, high, tilt_deg);
+        (format!("{name} (x {:.2} m, z {:.2} m{of}, tilted {tilt_deg:.0} degrees)", far * arm, high * arm), pose)
     };
-    request.setting.placements = vec![
+    let places = vec![
         place("near", 0.4, 0.0, 0.0),
         place("middle", 0.5, 0.0, 0.0),
         place("far", 0.65, 0.0, 0.0),
         place("raised", 0.5, 0.3, 30.0),
     ];
+    request.setting.placements = places;
     let mut trial = request.clone();
     trial.candidates.count = TRIAL_CANDIDATES.max(8 * trial.count);
     trial.budget = Budget::default();
@@ -430,7 +440,7 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)>
     }
     if placements.is_empty() {
         let place = match mount {
-            CameraMount::Hand => Pose::from_xyz_rpy([0.5 * robot.chain.arm_length_m(), 0.0, 0.0], [0.0; 3]),
+            CameraMount::Hand => before_robot(&robot.chain, 0.5, 0.0, 0.0),
             CameraMount::Fixed => Pose::from_xyz_rpy([0.0, 0.0, 0.05], [0.0; 3]),
         };
         placements.push(("placement_0".to_owned(), place));
