@@ -78,7 +78,7 @@ pub fn device_moved(robot: &Robot, points: &[MeasuredPoint], fit: &PointFit, lim
     let by = |p: &MeasuredPoint| {
         by_frame_and_reflector(&fit.device_from_base, &robot.base_from_tip(&p.readings), &fit.tip_point_m)
     };
-    let by_frame: Vec<Rows> = points.iter().map(|p| Rows::from_column_slice(9, by(p).as_slice())).collect();
+    let by_frame: Vec<Rows> = points.iter().map(|p| Rows::from_column_slice(by(p).as_slice())).collect();
     let alone = SteppedFit::new(by_frame.clone(), fit.residuals_m.clone())?;
     let beside_errors = || {
         let (rows, residuals) = beside_usual_errors(robot, points, fit, limits)?;
