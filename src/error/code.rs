@@ -232,6 +232,7 @@ codes! {
         ClockSetBack "clock_set_back" "the times of a recording go back: a clock was set",
         ImagesDelayed "images_delayed" "images arrive later or earlier than joint states of the same stamp",
         ImageDelayFound "image_delay_found" "motion in the images tells of a delay, which is taken off",
+        ImageDelayUnchecked "image_delay_unchecked" "motion in the images does not tell their delay",
         RobotNeverStill "robot_never_still" "the robot never stands still long enough",
         JointSilent "joint_silent" "joints have no readings for a part of a recording",
         JointStatesOfTwo "joint_states_of_two" "joint states of two publishers stand in one topic",

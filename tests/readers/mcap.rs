@@ -211,7 +211,8 @@ fn a_robot_that_never_stands_is_refused_unless_asked_for() {
     let restless = RecordingOptions { least_still_s: 5.0, ..three() };
     let message = refusal(&recording("mono8"), &restless);
     assert_says(&message, Code::RobotNeverStill, &["5 s", "0.010 s", "5 places"]);
-    let accepting = RecordingOptions { motion: Motion::Accept { interval_s: 0.45 }, ..restless };
+    let motion = Motion::Accept { interval_s: 0.45 };
+    let accepting = RecordingOptions { motion, image_delay_s: Some(0.0), ..restless };
     let (_folder, extracted) = read(&recording("mono8"), &accepting);
     // Images every 0.1 s over 7.0 s, at least 0.45 s apart: every fifth.
     assert_eq!(extracted.stops.stops.len(), 14);

@@ -289,6 +289,45 @@ fn images_in_motion_get_the_joints_of_their_moment() {
     assert!(extracted.stops.stops.len() > 2 * STOPS && 5 * wrong < recorded.wrong(&stamped, 12.0), "{wrong}");
 }
 
+/// A delay below half the time from image to image is nothing to a robot that stands; in motion it is taken off, and of readings that are
+/// still uncertain by more than 5 mrad nothing is made.
+#[test]
+fn short_delays_count_in_motion() {
+    let motion = Motion::Accept { interval_s: 0.2 };
+    for (seed, step_s, delay_s) in [(32, 0.1, 0.04), (33, 0.05, 0.02)] {
+        let recorded = Recorded::new(seed, step_s, delay_s);
+        let extracted = recorded.extract(&RecordingOptions { motion, ..RecordingOptions::default() });
+        let late = extracted.late.unwrap();
+        println!("{late:?}");
+        assert!((late.delay_s - delay_s).abs() < (4.0 * late.sigma_s).max(0.004), "{late:?} {delay_s}");
+        let in_motion = extracted.reports.iter().filter(|r| r.speed > 0.1).count();
+        assert!(in_motion > STOPS / 2, "{in_motion}");
+        assert!(extracted.reports.iter().all(|r| r.speed * late.sigma_s <= 5e-3 + 1e-12), "{late:?}");
+        // Stamps name the images: what the arm did at what they show.
+        for stop in &extracted.stops.stops {
+            let shown = recorded.arm.joints(stop.time_s.unwrap() - START_S - delay_s);
+            let off =
+                stop.raw_readings.iter().flatten().zip(shown).map(|(q, wanted)| (q - wanted).abs()).fold(0.0, f64::max);
+            // The fastest motion is of 0.8 rad in 0.4 s, by a cosine: 3.1 rad/s.
+            assert!(off < 3.2 * (4.0 * late.sigma_s).max(0.004), "{}: {off}", stop.image);
+        }
+        let standing = recorded.extract(&RecordingOptions::default());
+        assert!(standing.late.is_none_or(|late| late.delay_s > 0.5 * step_s), "{:?}", standing.late);
+    }
+}
+
+/// Images three a second do not tell their delay: none is taken in motion, unless the delay is stated.
+#[test]
+fn nothing_is_taken_in_motion_while_the_delay_is_not_known() {
+    let motion = Motion::Accept { interval_s: 0.3 };
+    let recorded = Recorded::new(34, 0.3, 0.02);
+    let options = RecordingOptions { motion, ..RecordingOptions::default() };
+    let error = extract(&recorded.path, &recorded.folder.path().join("images"), &options).unwrap_err();
+    assert_eq!((error.code, error.exit_code()), (Code::ImageDelayUnchecked, 2), "{error}");
+    let stated = recorded.extract(&RecordingOptions { image_delay_s: Some(0.02), ..options });
+    assert!(stated.reports.iter().filter(|r| r.speed > 0.1).count() > STOPS / 2);
+}
+
 /// Three wrong bytes in one chunk cost the stops that were taken in it, and no others.
 #[test]
 fn damage_costs_the_stops_of_its_own_chunk_alone() {

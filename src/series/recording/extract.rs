@@ -6,7 +6,8 @@ use super::collect::{Collector, Group, StopReport};
 use super::delay::{self, Delay, Frames, Guess};
 use super::file::for_each;
 use super::messages::CameraInfo;
-use super::motion::{Posture, Standstill, interpolate, postures, standstills};
+use super::motion::{Posture, Standstill, postures, standstills};
+use super::moving::Moving;
 use super::options::{Clock, Motion, RecordingOptions};
 use super::scan::{JointReadings, Scan, or_urdf, scan};
 use super::silence::{self, Gaps};
@@ -42,7 +43,7 @@ pub struct Extracted {
     pub image_topic: String,
     /// How much longer images take from stamp to recording than joint states (median), s.
     pub image_delay_s: f64,
-    /// How late the images are by what they show, where this is notable; it was taken off.
+    /// How late the images are by what they show, where this is notable or images in motion are taken; it was taken off.
     pub late: Option<Delay>,
     /// The camera as the recording describes it.
     pub camera_info: Option<CameraInfo>,
@@ -99,7 +100,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let late = told.late();
     scan.notices.extend(late.map(|d| d.notice(recording)));
     let growth_s = scan.delay_growth_s(&image_topic) - scan.delay_growth_s(&topics[0]);
-    let groups = groups(&mut scan, &postures, &times, options, open).map_err(|error| {
+    let groups = groups(&mut scan, &postures, &times, options, (open, told.sigma_s())).map_err(|error| {
         let never_still = error.code == Code::RobotNeverStill;
         // Degrees are as many times too fast as radians.
         seems_degrees
@@ -191,7 +192,7 @@ enum Told {
     By(f64),
     /// What the images show tells it.
     Found(Delay),
-    /// What the images show tells that there is none.
+    /// What the images show tells that there is none that matters to a robot that stands.
     NoDelay,
     /// The images do not tell it.
     Open,
@@ -202,6 +203,15 @@ impl Told {
         match self {
             Self::Found(delay) => Some(delay),
             _ => None,
+        }
+    }
+
+    /// Standard deviation of the delay that is taken off, s; none where nothing is known of it.
+    fn sigma_s(self) -> Option<f64> {
+        match self {
+            Self::By(_) => Some(0.0),
+            Self::Found(delay) => Some(delay.sigma_s),
+            Self::NoDelay | Self::Open => None,
         }
     }
 }
@@ -226,7 +236,7 @@ fn told_by_motion(
     }
     let pairs = frames.pairs();
     Ok(match delay::measured(&pairs, postures, guess) {
-        Some(delay) if delay.is_notable(&pairs) => Told::Found(delay),
+        Some(delay) if options.motion != Motion::Refuse || delay.is_notable(&pairs) => Told::Found(delay),
         Some(_) => Told::NoDelay,
         None => Told::Open,
     })
@@ -258,13 +268,13 @@ fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<(
     ))
 }
 
-/// Images of the standstills; where it is `open` whether they are late by so many ns, those of both.
+/// Images of the standstills; where it is `open` whether they are late by so many ns, those of both. `sigma_s`: as [`Told::sigma_s`].
 fn groups(
     scan: &mut Scan,
     postures: &[Posture],
     times: &[i64],
     options: &RecordingOptions,
-    open: i64,
+    (open, sigma_s): (i64, Option<f64>),
 ) -> Result<Vec<Group>> {
     let still = standstills(postures, options.still_speed, nanoseconds(options.least_still_s));
     let mut groups: Vec<Group> = Vec::new();
@@ -288,15 +298,13 @@ fn groups(
                 format!("{}: where the robot was at an image in motion is not known", delayed(-1e-9 * open as f64));
             return Err(Error::new(Code::ClocksApart, &place, what, OTHER_CLOCK));
         }
-        let outside =
-            |t: &i64| still.iter().all(|s| !(s.from_ns..=s.to_ns).contains(t)) && interpolate(postures, *t).is_some();
-        let mut last = i64::MIN;
-        for time in times.iter().copied().filter(outside) {
-            if time.saturating_sub(last) >= (interval_s * 1e9) as i64 {
-                groups.push(vec![time]);
-                last = time;
-            }
+        let moving = Moving::of(&place, (postures, &still), times, interval_s, sigma_s)?;
+        let notice = moving.notice(&place, sigma_s);
+        groups.extend(moving.taken.iter().map(|time| vec![*time]));
+        if let Some(Notice { code, place, what, remedy }) = notice.clone().filter(|_| groups.is_empty()) {
+            return Err(Error::new(code, place, what, remedy));
         }
+        scan.notices.extend(notice);
         groups.sort();
     } else if !groups.is_empty() && standing.is_missed(used, times.len()) {
         return Err(missed(&place, used, times.len(), options));
@@ -466,11 +474,11 @@ mod tests {
         let options = RecordingOptions::default();
         let (postures, times) = recorded(&[&[(100, false)][..], &short].concat());
         let mut scan = Scan::default();
-        assert_eq!(groups(&mut scan, &postures, &times, &options, 0).unwrap().len(), 1);
+        assert_eq!(groups(&mut scan, &postures, &times, &options, (0, None)).unwrap().len(), 1);
         let told = scan.notices.iter().find(|n| n.code == Code::RobotNeverStill).unwrap();
         assert!(told.what.contains("3 places"), "{told:?}");
         let (postures, times) = recorded(&short);
-        let error = groups(&mut Scan::default(), &postures, &times, &options, 0).unwrap_err();
+        let error = groups(&mut Scan::default(), &postures, &times, &options, (0, None)).unwrap_err();
         assert_eq!((error.code, error.what.contains("3 places")), (Code::RobotNeverStill, true), "{error}");
     }
 
@@ -481,15 +489,15 @@ mod tests {
         let (postures, times) = recorded(&drive);
         let options = RecordingOptions::default();
         let late: Vec<i64> = (0..20).map(|k| (k * 180 + if k == 7 { 50 } else { 140 }) * 10_000_000).collect();
-        let error = groups(&mut Scan::default(), &postures, &late, &options, 0).unwrap_err();
+        let error = groups(&mut Scan::default(), &postures, &late, &options, (0, None)).unwrap_err();
         assert_eq!(error.code, Code::ImagesInMotion, "{error}");
         // Every 5 s, without regard to the stops, which have one in about two or three.
         let slow: Vec<i64> = times.iter().copied().step_by(100).collect();
-        let taken = groups(&mut Scan::default(), &postures, &slow, &options, 0).unwrap().len();
+        let taken = groups(&mut Scan::default(), &postures, &slow, &options, (0, None)).unwrap().len();
         assert!((2..10).contains(&taken), "{taken}");
         // Only the last stops have images, at a high rate.
         let last = &times[times.len() * 4 / 5..];
-        assert_eq!(groups(&mut Scan::default(), &postures, last, &options, 0).unwrap().len(), 4);
+        assert_eq!(groups(&mut Scan::default(), &postures, last, &options, (0, None)).unwrap().len(), 4);
     }
 
     #[test]

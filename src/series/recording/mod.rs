@@ -19,6 +19,7 @@ mod kind;
 mod message;
 mod messages;
 mod motion;
+mod moving;
 mod options;
 mod order;
 mod parts;
