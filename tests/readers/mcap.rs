@@ -206,6 +206,38 @@ fn what_was_recorded_in_times_that_are_there_twice_is_left_out() {
     }
 }
 
+/// By 0.3 s while the robot moves: both halves together read as two publishers.
+#[test]
+fn a_clock_that_is_set_back_by_a_little_is_no_second_publisher() {
+    let whole = fs::read(recording("lz4.mcap")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set_back.mcap");
+    let mut writer = mcap::Writer::new(fs::File::create(&path).unwrap()).unwrap();
+    for message in mcap::MessageStream::new(&whole).unwrap() {
+        let mut message = message.unwrap();
+        let schema = message.channel.schema.as_ref().map(|schema| schema.name.clone()).unwrap_or_default();
+        if ["sensor_msgs/msg/JointState", "sensor_msgs/msg/CompressedImage"].contains(&schema.as_str()) {
+            let data = message.data.to_mut();
+            let [seconds, nanoseconds] = [4, 8].map(|k| u32::from_le_bytes(data[k..k + 4].try_into().unwrap()));
+            let stamp = i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds);
+            let stamp = stamp - if stamp < START_NS + 2_800_000_000 { 0 } else { 300_000_000 };
+            data[4..8].copy_from_slice(&((stamp / 1_000_000_000) as u32).to_le_bytes());
+            data[8..12].copy_from_slice(&((stamp % 1_000_000_000) as u32).to_le_bytes());
+        }
+        writer.write(&message).unwrap();
+    }
+    writer.finish().unwrap();
+    let (_images, extracted) = read(&path, &three());
+    let told = extracted.notices.iter().find(|n| n.code == Code::ClockSetBack).unwrap();
+    assert_says(told, Code::ClockSetBack, &["0.3 s", "--clock log"]);
+    // Nothing of a stop was recorded twice: at 2.8 s the robot is on its way.
+    assert_eq!(extracted.stops.stops.len(), STOPS);
+    for (k, stop) in extracted.stops.stops.iter().enumerate() {
+        let off = stop.raw_readings.iter().flatten().zip(posture(k)).map(|(q, wanted)| (q - wanted).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-12, "stop {k}");
+    }
+}
+
 #[test]
 fn a_robot_that_never_stands_is_refused_unless_asked_for() {
     let restless = RecordingOptions { least_still_s: 5.0, ..three() };

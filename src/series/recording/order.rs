@@ -57,6 +57,39 @@ pub(super) fn twice(times: impl Iterator<Item = i64> + Clone) -> Vec<Range<i64>>
     twice
 }
 
+/// Stamps of one publisher that are there twice because its clock was set back by more than a few steps: its messages come one after the
+/// other, before and behind, and their stamps are those of before once more. Of each: time of recording, and from the stamp to there, ns.
+pub(super) fn set_back(messages: &[(i64, i64)]) -> Vec<Range<i64>> {
+    let stamps: Vec<i64> = messages.iter().map(|(log_ns, delay_ns)| log_ns - delay_ns).collect();
+    let mut steps: Vec<i64> = stamps.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0).collect();
+    steps.sort_unstable();
+    let longest = steps.get(steps.len() * 9 / 10).map_or(i64::MAX, |step| step.saturating_mul(STEPS_APART));
+    let goes_on =
+        |part: &[i64]| part.len() == LEAST_OF_A_PART && part.windows(2).all(|w| (0..=longest).contains(&(w[1] - w[0])));
+    let is_back = |k: &usize| {
+        let back = stamps[*k] < stamps[k - 1].saturating_sub(longest) && messages[*k].0 >= messages[k - 1].0;
+        back && goes_on(&stamps[k.saturating_sub(LEAST_OF_A_PART)..*k])
+            && goes_on(&stamps[*k..(k + LEAST_OF_A_PART).min(stamps.len())])
+    };
+    let set: Vec<usize> = (1..stamps.len()).filter(is_back).take(MOST_SET + 1).collect();
+    if set.len() > MOST_SET {
+        return Vec::new();
+    }
+    let twice = set.into_iter().map(|k| (k, stamps[k]..stamps[k - 1]));
+    let are_there = |(k, stretch): &(usize, Range<i64>)| {
+        [&stamps[..*k], &stamps[*k..]].into_iter().all(|part| is_dense(part, stretch, longest))
+    };
+    twice.filter(are_there).map(|(_, stretch)| stretch).collect()
+}
+
+/// Whether there are times all over a stretch.
+fn is_dense(times: &[i64], stretch: &Range<i64>, longest: i64) -> bool {
+    let mut inside: Vec<i64> = times.iter().copied().filter(|time| stretch.contains(time)).collect();
+    inside.extend([stretch.start, stretch.end]);
+    inside.sort_unstable();
+    inside.windows(2).all(|w| w[1] - w[0] <= longest)
+}
+
 /// From every time that lies behind the latest one to that.
 fn back(times: impl Iterator<Item = i64>) -> Vec<Range<i64>> {
     let mut latest = i64::MIN;
@@ -114,6 +147,29 @@ mod tests {
         assert_eq!(of(&[sparse.to_vec()]), back(50, 60));
         // Two publishers, one of them two seconds late.
         assert_eq!(of(&[vec![2, 0, 3, 1, 4, 2].into_iter().map(|s| s * 1_000_000_000).collect()]).len(), 3);
+    }
+
+    /// Steps of 10 ms; recorded as they came, 1 ms after what they say or by another clock.
+    #[test]
+    fn a_clock_that_is_set_back_by_less_than_half_a_second_is_told_by_its_messages() {
+        let hundredths = |range: Range<i64>| range.map(|k| k * 10_000_000).collect::<Vec<i64>>();
+        let of = |parts: &[Vec<i64>]| {
+            let came = parts.concat().into_iter().enumerate();
+            set_back(&came.map(|(k, stamp)| (k as i64 * 10_000_000, k as i64 * 10_000_000 - stamp)).collect::<Vec<_>>())
+        };
+        let back = |from: i64, to: i64| vec![Range { start: from * 10_000_000, end: to * 10_000_000 }];
+        assert_eq!(of(&[hundredths(0..500), hundredths(470..900)]), back(470, 499));
+        assert_eq!(of(&[hundredths(0..500), hundredths(494..900)]), back(494, 499));
+        assert_eq!(of(&[hundredths(0..500), hundredths(300..900)]), back(300, 499));
+        // By a few steps, as messages that overtake each other; one that comes late; a part out of its place.
+        assert_eq!(of(&[hundredths(0..500), hundredths(497..900)]), []);
+        assert_eq!(of(&[hundredths(0..500), hundredths(480..481), hundredths(500..900)]), []);
+        assert_eq!(of(&[hundredths(0..400), hundredths(440..480), hundredths(400..440), hundredths(480..900)]), []);
+        // Two publishers by two clocks; a recorder whose clock was set as well.
+        let two: Vec<i64> = (0..500).flat_map(|k| [k * 10_000_000, k * 10_000_000 - 305_000_000]).collect();
+        assert_eq!(of(&[two]), []);
+        let stamps = [hundredths(0..500), hundredths(470..900)].concat();
+        assert_eq!(set_back(&stamps.into_iter().map(|stamp| (stamp, 0)).collect::<Vec<_>>()), []);
     }
 
     #[test]

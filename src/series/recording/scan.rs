@@ -10,7 +10,7 @@ use super::file::for_each;
 use super::message::Message;
 use super::messages::{self, CameraInfo, JointState};
 use super::options::{Clock, RecordingOptions};
-use super::order::{Written, twice};
+use super::order::{Written, set_back, twice};
 use super::parts::{Parts, parts_of};
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::linalg::median_by;
@@ -107,7 +107,7 @@ pub(super) fn scan(recording: &Path, clock: Clock) -> Result<Scan> {
         scan.notices.extend(damage);
         scan.inputs.push(InputFile::of_file(&path)?);
     }
-    scan.leave_out_what_was_twice();
+    scan.leave_out_what_was_twice(clock);
     scan.judge()?;
     Ok(scan)
 }
@@ -226,22 +226,28 @@ impl Scan {
     }
 
     /// Leaves out what was recorded in times that were there twice: nobody knows which picture belongs to which joints.
-    fn leave_out_what_was_twice(&mut self) {
+    fn leave_out_what_was_twice(&mut self, clock: Clock) {
         if self.topics.values().any(|topic| topic.written.in_no_order()) {
             // The file says nothing of the order in which its messages came.
             return;
         }
         let of_joints = self.joints.values().flat_map(|samples| twice(samples.iter().map(|s| s.time_ns)));
         let of_images = self.images.values().flat_map(|times| twice(times.iter().copied()));
-        let twice: Vec<Range<i64>> = of_joints.chain(of_images).collect();
+        let by_stamps = self.joints.keys().filter(|_| clock == Clock::Stamp).filter_map(|name| self.topics.get(name));
+        let of_stamps = by_stamps.flat_map(|topic| set_back(&topic.delays_ns));
+        let twice: Vec<Range<i64>> = of_joints.chain(of_images).chain(of_stamps).collect();
         let Some(longest) = twice.iter().map(|t| t.end - t.start).max() else { return };
         let once = |time: i64| !twice.iter().any(|t| (t.start..=t.end).contains(&time));
         self.joints.values_mut().for_each(|samples| samples.retain(|s| once(s.time_ns)));
         self.images.values_mut().for_each(|times| times.retain(|t| once(*t)));
         let what =
             format!("its times go back by {:.1} s: a clock was set while it was recorded", longest as f64 * 1e-9);
-        let remedy =
-            "what was recorded in the times that are there twice is left out; record again with a clock that runs on";
+        let left_out = "what was recorded in the times that are there twice is left out";
+        let remedy = match clock {
+            Clock::Stamp => "take the times of recording (--clock log), or record again with a clock that runs on",
+            Clock::Log => "record again with a clock that runs on",
+        };
+        let remedy = format!("{left_out}; {remedy}");
         self.notices.push(Notice::new(Code::ClockSetBack, self.recording.display(), what, remedy));
     }
 
