@@ -237,6 +237,7 @@ codes! {
         JointSilent "joint_silent" "joints have no readings for a part of a recording",
         JointStatesOfTwo "joint_states_of_two" "joint states of two publishers stand in one topic",
         ImagesInMotion "images_in_motion" "images were taken while the robot moved",
+        ImagesUnlike "images_unlike" "images of one standstill that were averaged show different things",
         StandstillWithoutImage "standstill_without_image" "a standstill has no image",
         StopsNotRecorded "stops_not_recorded" "stops are not in the recording: images or readings are missing",
     }

@@ -96,6 +96,7 @@ fn is_information(code: Code) -> bool {
         code,
         Code::DictionaryGuessed
             | Code::ImageDelayFound
+            | Code::ImageDelayUnchecked
             | Code::ImageNotThere
             | Code::ImageTurned
             | Code::MarkersBright

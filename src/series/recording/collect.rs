@@ -14,7 +14,7 @@ use super::motion::{Interpolated, Posture, interpolate};
 use super::options::{Picking, RecordingOptions};
 use super::pixels::{self, Mean};
 use super::scan::time_ns;
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::files::batches;
 use crate::series::{DEFAULT_PLACEMENT, SeriesStop};
 
@@ -38,6 +38,28 @@ pub struct StopReport {
     pub sharpness: f64,
     /// Noise of one picture, counts; known where pictures were averaged.
     pub noise_counts: Option<f64>,
+}
+
+/// Images of a stop that differ so many times more than those of the quietest quarter of the stops show several things.
+const UNLIKE: f64 = 5.0;
+/// Rounding to whole counts.
+const ROUNDING_COUNTS: f64 = 0.29;
+
+/// Averages of images that do not show the same.
+pub(super) fn unlike(recording: &Path, reports: &[StopReport]) -> Option<Notice> {
+    let mut noises: Vec<(f64, &str)> =
+        reports.iter().filter_map(|r| Some((r.noise_counts?, r.image.as_str()))).collect();
+    noises.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let usual = noises.get(noises.len() / 4)?.0.max(ROUNDING_COUNTS);
+    let (most, image) = *noises.last()?;
+    let count = noises.iter().filter(|(noise, _)| *noise > UNLIKE * usual).count();
+    let what = format!(
+        "the images of {count} of {} stops differ by more than their noise, those of {image} by {most:.1} counts where {usual:.1} are usual: \
+         their average mixes images of motion with others",
+        noises.len()
+    );
+    let remedy = "take the sharpest image instead of the average, and find out whether the images are late (--image-delay SECONDS)";
+    (count > 0).then(|| Notice::new(Code::ImagesUnlike, recording.display(), what, remedy))
 }
 
 /// Image times that belong to one stop.
@@ -234,4 +256,31 @@ fn mean_joints(postures: &[Posture], times: &[i64]) -> Option<Interpolated> {
     }
     mean.positions.iter_mut().for_each(|q| *q /= all.len() as f64);
     Some(mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_average_of_images_that_differ_is_told() {
+        let report = |noise: Option<f64>| StopReport {
+            image: "a.png".to_owned(),
+            speed: 0.0,
+            nearest_sample_s: 0.0,
+            pictures: 9,
+            sharpness: 1.0,
+            noise_counts: noise,
+        };
+        let told = |noises: &[f64]| {
+            let reports: Vec<StopReport> = noises.iter().map(|noise| report(Some(*noise))).collect();
+            unlike(Path::new("run"), &reports).map(|n| n.code)
+        };
+        assert_eq!(told(&[2.0, 2.1, 1.9, 2.0, 33.0]), Some(Code::ImagesUnlike));
+        assert_eq!(told(&[2.0, 2.1, 33.0, 34.0, 35.0]), Some(Code::ImagesUnlike));
+        assert_eq!(told(&[2.0, 2.1, 1.9, 2.0, 6.0]), None);
+        // Rounding alone: a picture without noise.
+        assert_eq!(told(&[0.0, 0.0, 0.0, 1.0]), None);
+        assert_eq!(unlike(Path::new("run"), &[report(None)]), None);
+    }
 }

@@ -91,6 +91,18 @@ impl Delay {
     }
 }
 
+/// Said where the delay cannot be measured.
+pub(super) fn unchecked(recording: &Path) -> Notice {
+    let what = format!(
+        "whether the images are late could not be checked: it takes {} images about motions of a robot that stops, not more than {} s apart",
+        PICTURES.start(),
+        1e-9 * LONGEST_STEP_NS as f64
+    );
+    let remedy =
+        "take 5 images a second or more while the robot drives, too, or state the delay (--image-delay SECONDS)";
+    Notice::new(Code::ImageDelayUnchecked, recording.display(), what, remedy)
+}
+
 /// Two pictures in a row.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair {

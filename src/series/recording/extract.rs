@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::collect::{Collector, Group, StopReport};
+use super::collect::{Collector, Group, StopReport, unlike};
 use super::delay::{self, Delay, Frames, Guess};
 use super::file::for_each;
 use super::messages::CameraInfo;
@@ -153,7 +153,9 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         );
         notices.push(Notice::new(Code::ImagesDelayed, recording.display(), what, OTHER_CLOCK));
     }
-    let (stops, reports) = taken.rows.into_values().unzip();
+    notices.extend((told == Told::Open && !is_open).then(|| delay::unchecked(recording)));
+    let (stops, reports): (Vec<_>, Vec<_>) = taken.rows.into_values().unzip();
+    notices.extend(unlike(recording, &reports));
     Ok(Extracted {
         stops: Stops { joints, stops, ..Stops::default() },
         joint_unit,
