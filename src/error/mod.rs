@@ -174,7 +174,8 @@ pub fn plain_name<'a>(kind: &str, name: &'a str, place: impl fmt::Display) -> Re
     if !name.contains(is_hidden) {
         return Ok(name);
     }
-    let what = format!("the name of a {kind} has control characters: \"{}\"", name.escape_debug());
+    let article = if kind.starts_with(['a', 'e', 'i', 'o']) { "an" } else { "a" };
+    let what = format!("the name of {article} {kind} has control characters: \"{}\"", name.escape_debug());
     Err(Error::new(Code::NameUnprintable, place, what, "give it a name of letters, digits, - and _"))
 }
 

@@ -182,6 +182,7 @@ impl Columns {
         let written = |c: usize| table.rows().map(move |row| row.cell(c)).filter(|cell| !cell.is_empty());
         let is_text = |c: &&usize| written(**c).nth(1).is_some() && !written(**c).any(is_number);
         match self.joints.iter().find(is_text) {
+            Some(&text) if table.rows().any(|row| table.without_sign(row, text).is_some()) => Ok(()),
             // Where no column has any, the file is another one.
             Some(&text) if self.joints.iter().any(|&c| written(c).any(is_number)) => {
                 let what = format!(
@@ -190,7 +191,11 @@ impl Columns {
                     written(text).next().unwrap_or_default(),
                     RESERVED.join(", ")
                 );
-                Err(Error::new(Code::CsvNumber, table.place_of_header(), what, "remove the column"))
+                let remedy = match written(text).any(|cell| cell.contains(|c: char| c.is_ascii_digit())) {
+                    true => "write its cells as plain numbers; a column of remarks is removed",
+                    false => "remove the column",
+                };
+                Err(Error::new(Code::CsvNumber, table.place_of_header(), what, remedy))
             }
             _ => Ok(()),
         }

@@ -134,6 +134,10 @@ impl Table {
             let what = "its columns are separated by semicolons, under names that are separated by commas";
             return Err(Error::new(Code::CsvSeparator, self.place_of_line(line), what, OTHER_SEPARATOR));
         }
+        // Spreadsheets write rows of which all cells were emptied.
+        if record.iter().all(str::is_empty) {
+            return Ok(());
+        }
         if record.len() != self.headers.len() {
             let remark = [(1, self.headers.first().map(String::as_str)), (line, record.get(0))];
             if let Some((line, _)) = remark.into_iter().find(|(_, cell)| cell.is_some_and(|c| c.starts_with('#'))) {
@@ -217,12 +221,35 @@ impl Table {
         match cell.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
             _ => {
+                if let Some((sign, remedy)) = self.without_sign(row, column) {
+                    let what = format!("is not a number for its {sign}");
+                    return Err(self.refuse(Code::CsvNumber, row, column, &what, remedy));
+                }
                 let remedy = match cell.contains(',') {
                     true => "write numbers with a decimal point",
                     false => "write a finite number",
                 };
                 Err(self.refuse(Code::CsvNumber, row, column, "is not a number", remedy))
             }
+        }
+    }
+
+    /// The sign without which a cell is a number, and what to do about it.
+    pub fn without_sign(&self, row: Row<'_>, column: usize) -> Option<(String, &'static str)> {
+        let cell = row.cell(column);
+        if cell.parse::<f64>().is_ok() {
+            return None;
+        }
+        let plain = cell.replace(MINUS, "-");
+        let unit = UNITS.into_iter().find(|unit| plain.ends_with(unit));
+        let number = unit.map_or(plain.as_str(), |unit| plain[..plain.len() - unit.len()].trim_end());
+        number.replace(',', ".").parse::<f64>().ok().filter(|value| value.is_finite())?;
+        match unit {
+            Some(unit) => Some((format!("unit \"{unit}\""), "write numbers without a unit, throughout the column")),
+            None => cell.chars().find(|c| MINUS.contains(c)).map(|c| {
+                let remedy = "replace every such sign by the hyphen (-) that programs read as minus";
+                (format!("minus sign (U+{:04X})", u32::from(c)), remedy)
+            }),
         }
     }
 
@@ -250,6 +277,11 @@ impl Table {
         Error::new(code, self.place(row), what, remedy)
     }
 }
+
+/// Minus signs that word processors and web pages write.
+const MINUS: [char; 2] = ['\u{2212}', '\u{2013}'];
+/// Units that stand behind angles.
+const UNITS: [&str; 5] = ["\u{b0}", "deg", "Deg", "Grad", "grad"];
 
 const OTHER_SEPARATOR: &str = "save it with commas between columns and decimal points (spreadsheet language: English)";
 

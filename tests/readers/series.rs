@@ -92,6 +92,18 @@ fn byte_order_marks_crlf_blanks_and_quotes_do_not_matter() {
     assert_eq!(plain.stops.stops.iter().map(|s| s.line).collect::<Vec<_>>(), [2, 3, 4]);
 }
 
+/// Spreadsheets keep rows of which the cells were emptied.
+#[test]
+fn rows_of_empty_cells_are_no_stops() {
+    let joints = format!("{}\n,,,\n   \n , ,\n", JOINTS.trim_end().replacen("\nb.png", "\n,,,\nb.png", 1));
+    let (odd, plain) = (read(series_with(&[("joints.csv", &joints)]).path()), read(series_with(&[]).path()));
+    let names =
+        |s: &Series| s.stops.stops.iter().map(|s| (s.image.clone(), s.raw_readings.clone())).collect::<Vec<_>>();
+    let (odd, plain) = (odd.unwrap(), plain.unwrap());
+    assert_eq!(names(&odd), names(&plain));
+    assert_eq!(odd.stops.stops.iter().map(|s| s.line).collect::<Vec<_>>(), [2, 4, 5]);
+}
+
 #[test]
 fn a_bad_manifest_names_line_and_key() {
     let with = |line: &str| refusal(&[("series.toml", &format!("{MANIFEST}{line}\n"))]);
@@ -120,6 +132,13 @@ fn a_bad_joint_table_names_line_and_column() {
     let with = |text: &str| refusal(&[("joints.csv", text)]);
     assert_says(&with(&JOINTS.replace("1.5", "")), Code::CsvCellEmpty, &["joints.csv:3", "column j2"]);
     assert_says(&with(&JOINTS.replace("1.5", "x1")), Code::CsvNumber, &["joints.csv:3", "column j2", "\"x1\""]);
+    // Signs of word processors and units, in one cell and throughout a column.
+    assert_says(&with(&JOINTS.replace("1.5", "\u{2212}1.5")), Code::CsvNumber, &["joints.csv:3", "j2", "U+2212"]);
+    for (cells, sign) in [(["\u{2212}1.25", "\u{2212}1.5"], "U+2212"), (["1.25\u{b0}", "1.5\u{b0}"], "\u{b0}")] {
+        let [one, other] = cells;
+        let throughout = format!("image,j1,j2,x\na.png,0.1,{one},0.5\nb.png,0.2,{other},0.5\n");
+        assert_says(&with(&throughout), Code::CsvNumber, &["joints.csv:2", "column j2", sign]);
+    }
     assert_says(&with(&JOINTS.replace("1.5", "nan")), Code::CsvNumber, &["joints.csv:3", "nan"]);
     assert_says(&with(&JOINTS.replace("1.5", "\"1,5\"")), Code::CsvNumber, &["joints.csv:3", "\"1,5\""]);
     assert_says(&with(&JOINTS.replace("1.5", "1,5")), Code::CsvCellCount, &["joints.csv:3", "5 ", " 4 "]);
