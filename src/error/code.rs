@@ -150,6 +150,7 @@ codes! {
         JointUnitMissing "joint_unit_missing" "nothing states whether joint readings are degrees or radians",
         DegreesAsRadians "degrees_as_radians" "readings said to be radians are degrees",
         RadiansAsDegrees "radians_as_degrees" "readings said to be degrees are radians",
+        CountsAsAngles "counts_as_angles" "readings said to be angles are counts of encoders",
         MillimetresAsMetres "millimetres_as_metres" "readings of a prismatic joint are millimetres, centimetres, inches or feet",
         JointMissing "joint_missing" "a joint of the chain has no readings",
         JointUnused "joint_unused" "readings are of no joint of the chain",

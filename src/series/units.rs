@@ -9,6 +9,8 @@ use crate::urdf::{Chain, Joint, JointKind};
 
 /// No joint of an arm turns further than two full turns from zero on most of its stops.
 const TWO_TURNS_RAD: f64 = 4.0 * std::f64::consts::PI;
+/// No arm turns most of its joints ten turns from zero; even readings of degrees that are said to be radians are smaller, deg.
+const TEN_TURNS_DEG: f64 = 3600.0;
 /// A description may limit a joint to half a turn where the real one makes a whole turn to either side (UR arms).
 const FOREIGN_LIMITS_RAD: f64 = std::f64::consts::PI;
 /// Soft limits of controllers differ from those of the description by less than this.
@@ -119,11 +121,28 @@ pub fn check_unit(
     if rows.is_empty() {
         return Ok(());
     }
+    refuse_counts(file, unit, chain, rows)?;
     match unit {
         AngleUnit::Rad => refuse_degrees_as_radians(file, chain, rows, stating("deg"))?,
         AngleUnit::Deg => refuse_radians_as_degrees(file, chain, rows, &stating("rad"))?,
     }
     refuse_other_lengths(file, unit, chain, rows)
+}
+
+/// Most joints of most stops so far from zero are neither radians nor degrees.
+fn refuse_counts(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
+    let joints = revolute(chain).count();
+    let are_counts = |q: &&&[f64]| 2 * revolute(chain).filter(|&i| q[i].abs() > TEN_TURNS_DEG).count() > joints;
+    if 2 * rows.iter().filter(are_counts).count() <= rows.len() {
+        return Ok(());
+    }
+    let (joint, (low, high)) = widest(chain, rows);
+    let what = format!(
+        "joint_unit is {}, but {joint} reads {low} to {high}: most joints are more than ten turns from zero, as counts of encoders are",
+        unit.name()
+    );
+    let remedy = "convert the counts to degrees: by the counts of each axis for a turn, from those of its zero, as the controller has them";
+    Err(Error::new(Code::CountsAsAngles, file.display(), what, remedy))
 }
 
 fn refuse_degrees_as_radians(file: &Path, chain: &Chain, rows: &[&[f64]], remedy: String) -> Result<()> {

@@ -288,6 +288,13 @@ fn an_impossible_unit_is_refused_and_a_possible_one_is_not() {
     assert_eq!(with_readings(Rad, &radians), Ok(()));
     assert_says(&with_readings(Rad, &degrees).unwrap_err(), Code::DegreesAsRadians, &["joints.csv", "j1", "-100"]);
     assert_says(&with_readings(Deg, &radians).unwrap_err(), Code::RadiansAsDegrees, &["joints.csv", "j1"]);
+    // Encoder counts; of one joint alone that is wound up nothing is said.
+    let counts: Vec<[f64; 3]> = degrees.iter().map(|[x, a, b]| [*x, 1e3 * (a + 300.0), 1e3 * (b + 300.0)]).collect();
+    for unit in [Deg, Rad] {
+        assert_says(&with_readings(unit, &counts).unwrap_err(), Code::CountsAsAngles, &["joints.csv", unit.name()]);
+    }
+    let wound: Vec<[f64; 3]> = degrees.iter().map(|[x, a, b]| [*x, 1e3 * (a + 300.0), *b]).collect();
+    assert_eq!(with_readings(Deg, &wound), Ok(()));
     // A whole turn where the description allows half a one, on every stop.
     let turned: Vec<[f64; 3]> = radians.iter().map(|[x, a, b]| [*x, a - 4.2, *b]).collect();
     assert!(turned.iter().all(|q| q[1] < -3.0));
