@@ -154,6 +154,7 @@ codes! {
         MillimetresAsMetres "millimetres_as_metres" "readings of a prismatic joint are millimetres, centimetres, inches or feet",
         JointMissing "joint_missing" "a joint of the chain has no readings",
         JointUnused "joint_unused" "readings are of no joint of the chain",
+        JointUnusedMoves "joint_unused_moves" "readings of no joint of the URDF differ from stop to stop",
         CovariatesUnused "covariates_unused" "measured torques or temperatures are not used",
         JointBeyondLimits "joint_beyond_limits" "readings are beyond the limits of the joint",
         PosesOfTool "poses_of_tool" "poses of a controller that are said to be of the flange are those of a tool",

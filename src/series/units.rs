@@ -253,10 +253,19 @@ pub(super) fn notices(file: &Path, (stops, view): (&Stops, bool), unit: AngleUni
         format!("columns that are no joints {ends}, nor any of the URDF"),
         "they are not used; check the spelling if they should be",
     );
-    for (joints, (what, remedy)) in [(beside, of_other_branches), (unknown, of_none)] {
+    let that_vary = (
+        format!("columns that are no joints {ends}, nor any of the URDF, and differ from stop to stop"),
+        "where they move the robot, the camera or the plate (a rail, a lift), the URDF must have them as joints; else they are not used",
+    );
+    let (moving, unknown): (Vec<&String>, Vec<&String>) = unknown.into_iter().partition(|j| varies(stops, j));
+    for (joints, code, (what, remedy)) in [
+        (beside, Code::JointUnused, of_other_branches),
+        (unknown, Code::JointUnused, of_none),
+        (moving, Code::JointUnusedMoves, that_vary),
+    ] {
         if !joints.is_empty() {
             let names = joints.iter().map(|j| j.as_str()).collect::<Vec<_>>().join(", ");
-            notices.push(Notice::new(Code::JointUnused, file.display(), format!("{what}: {names}"), remedy));
+            notices.push(Notice::new(code, file.display(), format!("{what}: {names}"), remedy));
         }
     }
     notices.extend(unused_covariates(file, stops));
@@ -265,6 +274,14 @@ pub(super) fn notices(file: &Path, (stops, view): (&Stops, bool), unit: AngleUni
         notices.extend(beyond_limits(file, (stops, view), unit, chain, (reading, column)));
     }
     notices
+}
+
+/// Whether a column differs from stop to stop.
+fn varies(stops: &Stops, joint: &str) -> bool {
+    let column = stops.joints.iter().position(|j| j == joint);
+    let mut readings =
+        column.into_iter().flat_map(|c| stops.stops.iter().filter_map(move |s| s.raw_readings.as_ref()?.get(c)));
+    readings.next().is_some_and(|first| readings.any(|other| other != first))
 }
 
 /// Columns that are read, and of which no joint term makes use.

@@ -39,8 +39,8 @@ impl Verdict {
     /// Failed gates first, then what asks for care.
     pub fn of(record: &SolutionRecord) -> Self {
         if !record.failed_gates.is_empty() {
-            let reasons: Vec<VerdictReason> = record.failed_gates.iter().map(|gate| of_gate(record, gate)).collect();
-            return Self::failed(reasons, of_rows(record));
+            let gates = record.failed_gates.iter().map(|gate| of_gate(record, gate));
+            return Self::failed(of_columns(&record.notices).chain(gates).collect(), of_rows(record));
         }
         Self::not_failed(noted(&record.notices).collect())
     }
@@ -65,6 +65,12 @@ impl Verdict {
         let trust = if reasons.is_empty() { Trust::Good } else { Trust::Doubts };
         Self { trust, reasons, remedies: Vec::new() }
     }
+}
+
+/// An axis that moves and is not described is the likely cause of all else that failed.
+fn of_columns(notices: &[Notice]) -> impl Iterator<Item = VerdictReason> {
+    let moving = notices.iter().filter(|n| n.code == Code::JointUnusedMoves);
+    moving.map(|n| VerdictReason { what: format!("{}: {}", n.place, n.what), remedy: n.remedy.clone() })
 }
 
 /// Rows of readings that stand beside the wrong images are to be put right whatever else failed, and a better lens that could not be fitted is
@@ -104,6 +110,7 @@ fn is_information(code: Code) -> bool {
             | Code::ImageUnlisted
             | Code::ImagesInMotion
             | Code::JointUnused
+            | Code::JointUnusedMoves
             | Code::LensChosen
             | Code::ModelNotCompared
             | Code::ObservationsMissing
