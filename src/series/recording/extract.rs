@@ -101,6 +101,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     scan.notices.extend(late.map(|d| d.notice(recording)));
     let growth_s = scan.delay_growth_s(&image_topic) - scan.delay_growth_s(&topics[0]);
     let groups = groups(&mut scan, &postures, &times, options, (open, told.sigma_s())).map_err(|error| {
+        let error = or_set_back(error, &scan.notices);
         let never_still = error.code == Code::RobotNeverStill;
         // Degrees are as many times too fast as radians.
         seems_degrees
@@ -242,6 +243,17 @@ fn told_by_motion(
         Some(_) => Told::NoDelay,
         None => Told::Open,
     })
+}
+
+/// Times that do not fit to each other after a clock was set back: stamps are right by no delay.
+fn or_set_back(error: Error, notices: &[Notice]) -> Error {
+    match notices.iter().find(|n| n.code == Code::ClockSetBack && error.code == Code::ClocksApart) {
+        Some(set) => {
+            let what = format!("{}; {}", error.what, set.what);
+            Error::new(error.code, error.place, what, "take the times of recording (--clock log)")
+        }
+        None => error,
+    }
 }
 
 fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<()> {
@@ -500,6 +512,15 @@ mod tests {
         // Only the last stops have images, at a high rate.
         let last = &times[times.len() * 4 / 5..];
         assert_eq!(groups(&mut Scan::default(), &postures, last, &options, (0, None)).unwrap().len(), 4);
+    }
+
+    #[test]
+    fn a_clock_that_was_set_back_is_the_cause_of_times_that_do_not_fit() {
+        let apart = || Error::new(Code::ClocksApart, "run", "apart", OTHER_CLOCK);
+        let set = Notice::new(Code::ClockSetBack, "run", "back", "");
+        let error = or_set_back(apart(), &[set]);
+        assert_eq!((error.code, error.remedy == OTHER_CLOCK), (Code::ClocksApart, false));
+        assert_eq!(or_set_back(apart(), &[]), apart());
     }
 
     #[test]

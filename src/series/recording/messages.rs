@@ -90,6 +90,9 @@ impl RawImage {
     }
 }
 
+/// Formats of videos, whose pieces are no pictures of their own.
+const VIDEOS: [&str; 4] = ["theora", "h264", "h265", "hevc"];
+
 /// Bytes of a `sensor_msgs/CompressedImage`; its free-text format is not needed, the bytes tell.
 pub(super) fn compressed_image(message: &[u8]) -> Decoded<Vec<u8>> {
     let mut cdr = Cdr::new(message)?;
@@ -97,6 +100,9 @@ pub(super) fn compressed_image(message: &[u8]) -> Decoded<Vec<u8>> {
     let format = cdr.string()?;
     if format.contains("compressedDepth") {
         return Err("is a depth image".into());
+    }
+    if let Some(video) = VIDEOS.into_iter().find(|video| format.to_lowercase().contains(video)) {
+        return Err(format!("is a piece of a {video} video"));
     }
     Ok(cdr.bytes()?.to_vec())
 }

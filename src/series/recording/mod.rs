@@ -26,6 +26,7 @@ mod parts;
 mod pixels;
 #[cfg(feature = "mcap")]
 mod records;
+mod samples;
 mod scan;
 mod silence;
 mod sqlite;

@@ -1,6 +1,6 @@
 //! When the robot stood still, and where its joints were at a given time.
 
-use super::scan::JointSample;
+use super::samples::JointSample;
 
 /// All joints at one time.
 #[derive(Debug, Clone, PartialEq)]

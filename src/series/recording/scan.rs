@@ -12,22 +12,10 @@ use super::messages::{self, CameraInfo, JointState};
 use super::options::{Clock, RecordingOptions};
 use super::order::{Written, set_back, twice};
 use super::parts::{Parts, parts_of};
+use super::samples::{JointSample, shared};
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::linalg::median_by;
 use crate::series::InputFile;
-
-/// Some joints at one time.
-#[derive(Debug, Clone)]
-pub(super) struct JointSample {
-    pub time_ns: i64,
-    pub names: Rc<Vec<String>>,
-    /// As recorded: angles in rad or deg, lengths in m.
-    pub positions: Vec<f64>,
-    /// Joints of the message without a position that is a number.
-    pub unread: Rc<Vec<String>>,
-    /// What tells its publisher from others, see [`JointState::marks`].
-    pub marks: Rc<Vec<String>>,
-}
 
 /// The joint states of a robot.
 pub(super) struct JointReadings {
@@ -127,25 +115,6 @@ pub(super) fn time_ns(stamp_ns: i64, message: &Message<'_>, clock: Clock) -> i64
     match clock {
         Clock::Stamp if stamp_ns != 0 => stamp_ns,
         _ => log_time_ns(message),
-    }
-}
-
-/// Publishers of one topic that may take turns.
-const MOST_IN_TURN: usize = 8;
-
-/// The names of one of the last samples where they are the same; memory that others need is added to `held`.
-fn shared(
-    samples: &[JointSample],
-    of: impl Fn(&JointSample) -> &Rc<Vec<String>>,
-    names: Vec<String>,
-    held: &mut usize,
-) -> Rc<Vec<String>> {
-    match samples.iter().rev().take(MOST_IN_TURN).map(of).find(|last| ***last == names) {
-        Some(last) => Rc::clone(last),
-        None => {
-            *held += names.iter().map(|n| n.len() + size_of::<String>()).sum::<usize>();
-            Rc::new(names)
-        }
     }
 }
 
@@ -436,13 +405,14 @@ impl Scan {
     fn unreadable(&self, topic: &str, wanted: &Wanted) -> Error {
         let reason = self.topics.get(topic).map_or("", |t| t.reason.as_str());
         let place = format!("{}, topic {topic}", self.recording.display());
-        let reason = if reason.is_empty() { String::new() } else { format!(": one {reason}") };
-        Error::new(
-            Code::MessagesUnreadable,
-            place,
-            format!("none of its {} can be used{reason}", wanted.what),
-            "record it again",
-        )
+        let (reason, remedy) = match reason {
+            "" => (
+                ": they hold no positions".into(),
+                "name a topic with positions (--joint-topic), or let the driver send them",
+            ),
+            _ => (format!(": one {reason}"), "record it again"),
+        };
+        Error::new(Code::MessagesUnreadable, place, format!("none of its {} can be used{reason}", wanted.what), remedy)
     }
 
     /// The camera info beside an image topic, or the only one.
@@ -521,6 +491,21 @@ mod tests {
         assert_eq!((unread.as_slice(), nothing.len()), (&["a".to_owned(), "b".to_owned()][..], 0));
         assert_eq!(scan.topics["/joints"].malformed, 1);
         assert_eq!((scan.topics["/gripper"].malformed, scan.joints.contains_key("/gripper")), (1, false));
+    }
+
+    #[test]
+    fn joint_states_without_positions_are_not_to_be_recorded_again() {
+        let of = |data: &[u8]| {
+            let mut scan = Scan::default();
+            let schema = messages::JOINT_STATE;
+            scan.note(&Message { topic: "/a", schema, encoding: "cdr", log_time_ns: 1, data }, Clock::Stamp);
+            scan.joint_readings(&RecordingOptions::default()).err().map(|e| (e.code, e.remedy))
+        };
+        // One name; no position behind it, and a number of positions that is cut off.
+        let data = joint_state(&[("a", 0.5)]);
+        let (without, cut) = (of(&[&data[..32], &[0; 4]].concat()).unwrap(), of(&data[..34]).unwrap());
+        assert_eq!((without.0, cut.0), (Code::MessagesUnreadable, Code::MessagesUnreadable));
+        assert_ne!(without.1, cut.1);
     }
 
     /// A rail and the arm on it often have a topic each.

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::rc::Rc;
 
 use super::motion::{LONGEST_GAP_NS, WINDOW_NS};
-use super::scan::JointSample;
+use super::samples::JointSample;
 use crate::error::{Code, Notice};
 
 /// From one time to another, ns.

@@ -1,7 +1,7 @@
 //! Joint states of two publishers in one topic: readings that go to and fro as no joint does.
 
 use super::motion::WINDOW_NS;
-use super::scan::JointSample;
+use super::samples::JointSample;
 use crate::error::{Code, Error, Result};
 
 /// Of two publishers, one sends no more than so many times between two messages of the other where readings are seen to leave and come back.
