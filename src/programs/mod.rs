@@ -23,6 +23,7 @@
 
 pub mod codes;
 pub mod compensate;
+mod external;
 pub mod field;
 mod flow;
 mod foreign;

@@ -121,5 +121,14 @@ impl Why {
     /// The target is not written in numbers.
     pub(super) fn computed() -> Self {
         Self::new(LeftReason::Computed, "its target is computed, not written in numbers")
+    /// The target leaves such an axis out, which stands elsewhere than at zero, or may do so where no place is known.
+    pub(super) fn external_kept(axis: &str, place: Option<f64>) -> Self {
+        let stands = place.map_or("may stand elsewhere than at zero".to_owned(), |value| format!("stands at {value}"));
+        let words = format!(
+            "it leaves out {axis}, which {stands}, and the description has no such axis: it may carry the robot or the work (give a description that has it, or --axes-apart where it does neither)"
+        );
+        Self::new(LeftReason::ExternalAxis, words)
+    }
+
     }
 }

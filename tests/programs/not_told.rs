@@ -167,6 +167,53 @@ fn poses_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_
     }
 }
 
+/// What a pose of KRL leaves out keeps its place, and so does an external axis of RAPID at `9E9`.
+#[test]
+fn poses_that_leave_out_an_external_axis_are_left_where_it_may_stand_elsewhere_than_at_zero() {
+    let cell = Cell::kuka(68);
+    let q: Vec<f64> = START.iter().map(|q| q.to_radians()).collect();
+    let (pose, axes) = (krl(&cell, &q), START.map(|q| format!("{q:.1}")));
+    let angles: Vec<String> = axes.iter().enumerate().map(|(k, v)| format!("A{} {v}", k + 1)).collect();
+    let at = |e: &str| format!("PTP {{E6AXIS: {},E1 {e}}}\n", angles.join(","));
+    let [far, home, there] = [at("500.0"), at("0.0"), format!("PTP {pose}\n")];
+    let with_axis = there.replace('}', ",E1 300.0}");
+    let external = LeftReason::ExternalAxis.name().to_owned();
+    let start = format!("--start={}", axes.join(","));
+    for (body, corrected, left) in [
+        (format!("{there}{there}"), 2, 0),
+        (format!("{home}{there}"), 2, 0),
+        (format!("{far}{there}"), 1, 1),
+        (format!("{far}{home}{there}"), 3, 0),
+        (format!("{home}{with_axis}{there}"), 1, 2),
+        (format!("IF a THEN\n{far}ELSE\n{home}ENDIF\n{there}"), 2, 1),
+        (format!("{far}sub()\nEND\nDEF sub()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{there}"), 1, 1),
+        // A program before this one, or the last run of it, may have left the axis there.
+        (format!("{there}{far}"), 1, 1),
+    ] {
+        let src = |body: &str| format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{body}END\n");
+        let found = told(&cell, &[("a.src", src(&body))], &[&start]);
+        assert_eq!(found, (corrected, vec![external.clone(); left]), "{body}");
+        let apart = told(&cell, &[("a.src", src(&body))], &[&start, "--axes-apart"]);
+        assert_eq!(apart, (corrected + left, vec![]), "{body}");
+    }
+    let target = robtarget(&cell.nominal.base_from_tip(&q), UNCHECKED);
+    let at = |e: &str| format!("MoveAbsJ [[{}],[{e},9E9,9E9,9E9,9E9,9E9]],v10,fine,tool0;\n", axes.join(","));
+    let there = format!("MoveJ {target},v10,fine,tool0;\n");
+    for (body, corrected, left) in [
+        (format!("{}{there}", at("500")), 1, 1),
+        (format!("{}{there}", at("9E9")), 2, 0),
+        (format!("{}{there}", at("0")), 2, 0),
+        (format!("{}{}{there}", at("500"), at("0")), 3, 0),
+        (format!("{}{}{there}", at("500"), at("9E9")), 2, 1),
+        (format!("{}sub;\nENDPROC\nPROC sub()\n{there}", at("500")), 1, 1),
+    ] {
+        let text = format!("MODULE m\nPROC main()\nConfJ\\Off;\n{body}ENDPROC\nENDMODULE\n");
+        let found = told(&cell, &[("m.mod", text.clone())], &[&start]);
+        assert_eq!(found, (corrected, vec![external.clone(); left]), "{body}");
+        assert_eq!(told(&cell, &[("m.mod", text)], &[&start, "--axes-apart"]), (corrected + left, vec![]), "{body}");
+    }
+}
+
 #[test]
 fn poses_behind_branches_that_set_tool_frame_or_displacement_differently_are_left() {
     let mut cell = Cell::kuka(67);

@@ -345,10 +345,16 @@ fn a_jointtarget_of_external_axes_alone_is_none_of_the_arm() {
     let cell = Cell::kuka(351);
     let step = "MoveJ @,v1,z1,tGun\\WObj:=wTable;";
     let none = "9E9,9E9,9E9,9E9,9E9,9E9";
-    let external = format!("[[{none}],[10,9E9,9E9,9E9,9E9,9E9]]");
-    let declared = format!("MoveExtJ jExt,v1,z1;\n{step}\nENDPROC\nCONST jointtarget jExt:={external};\nPROC Last()");
-    assert_told(&cell, &declared, 1, &[]);
-    assert_told(&cell, &format!("MoveAbsJ {external},v1,z1,tGun;\n{step}"), 1, &[LeftReason::NotATarget.name()]);
+    let [no_target, external_axis] = [LeftReason::NotATarget, LeftReason::ExternalAxis].map(LeftReason::name);
+    // Behind it the axis stands where it was moved to, and the pose leaves it there.
+    for (at, corrected, left) in [("0", 1, vec![]), ("10", 0, vec![external_axis])] {
+        let external = format!("[[{none}],[{at},9E9,9E9,9E9,9E9,9E9]]");
+        let declared =
+            format!("MoveExtJ jExt,v1,z1;\n{step}\nENDPROC\nCONST jointtarget jExt:={external};\nPROC Last()");
+        assert_told(&cell, &declared, corrected, &left);
+        let left = [vec![no_target], left].concat();
+        assert_told(&cell, &format!("MoveAbsJ {external},v1,z1,tGun;\n{step}"), corrected, &left);
+    }
 }
 
 /// Such a program was refused as a whole.

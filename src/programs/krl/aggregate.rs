@@ -169,16 +169,15 @@ impl Aggregate {
 
     /// The first external axis behind `axes` that is not at zero.
     pub fn foreign(&self, axes: &[usize]) -> Option<(String, f64)> {
-        let numbers = self.elements.iter().filter_map(|(name, element)| match element {
-            Element::Number(value, _) => Some((name, *value)),
-            _ => None,
-        });
-        let is_foreign = |name: &str| {
-            let number = name.strip_prefix('E').and_then(|n| n.parse::<usize>().ok());
-            number.is_some_and(|n| n + 6 > axes.len().max(6))
-        };
-        let mut off_zero = numbers.filter(|(name, value)| *value != 0.0 && is_foreign(name));
-        off_zero.next().map(|(name, value)| (name.clone(), value))
+        let foreign = self.externals().filter(|(axis, _)| is_foreign(*axis, axes));
+        let mut off_zero = foreign.filter_map(|(axis, value)| Some((axis, value.filter(|v| *v != 0.0)?)));
+        off_zero.next().map(|(axis, value)| (external_name(axis), value))
+    }
+
+    /// External axes that it names, by their number from 0, and where it puts them: `None` where the text does not tell.
+    pub fn externals(&self) -> impl Iterator<Item = (usize, Option<f64>)> + '_ {
+        let place = |element: &Element| if let Element::Number(value, _) = element { Some(*value) } else { None };
+        self.elements.iter().filter_map(move |(name, element)| Some((external_axis(name)?, place(element))))
     }
 
     /// Values of the external axes by reading; `None` for the others and for those that are missing.
@@ -190,6 +189,22 @@ impl Aggregate {
         }
         fixed
     }
+}
+
+/// Number from 0 of the external axis `E1` to `E6` that a component is.
+pub(super) fn external_axis(name: &str) -> Option<usize> {
+    let number = name.strip_prefix('E')?.parse::<usize>().ok()?;
+    number.checked_sub(1)
+}
+
+/// Its name.
+pub(super) fn external_name(axis: usize) -> String {
+    format!("E{}", axis + 1)
+}
+
+/// True for an external axis behind those of the description.
+pub(super) fn is_foreign(axis: usize, axes: &[usize]) -> bool {
+    axis >= axes.len().saturating_sub(6)
 }
 
 /// `[3]` behind a name, as it belongs to the name; empty where there is none.

@@ -3,7 +3,7 @@
 use super::assigned::assigned;
 use super::frames::{FrameIs, Frames};
 use super::{Module, Now, unset};
-use crate::programs::flow::{Followed, Held};
+use crate::programs::flow::{Either, Followed, Held};
 use crate::programs::scan::Reader;
 
 /// What such a statement sets itself (`DO $BASE=..`), without a routine.
@@ -42,6 +42,7 @@ impl Module<'_> {
         let (mut active, stands) = self.now.clone();
         let [tool, base] = [&active.tool, &active.base].map(|is| is.value.at_some_time(RUN_AT_ANY_TIME));
         active.set(Frames { tool, base, tool_in_room: active.tool_in_room.value });
+        active.off_zero.set(active.off_zero.value.either(&self.off_zero_anywhere));
         names.iter().for_each(|name| _ = active.beside.value.remove(name));
         (active, stands)
     }

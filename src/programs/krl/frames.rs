@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::geom::Pose;
+use crate::programs::external::OffZero;
 use crate::programs::flow::{Either, Followed, Held};
 use crate::programs::program::StatedFrame;
 use crate::programs::scan::Reader;
@@ -167,6 +168,8 @@ pub(super) struct Active {
     pub keeps_orientation: Held<bool>,
     /// A sensor moves the robot on top of its targets, or may do so.
     pub is_sensed: Held<bool>,
+    /// External axes that do not stand at zero.
+    pub off_zero: Held<OffZero>,
     /// Routines and frames that an interrupt or a trigger may run or set at any time.
     pub beside: Held<BTreeSet<String>>,
 }
@@ -181,6 +184,7 @@ impl Active {
             tool_in_room: Held::new(tool_in_room),
             keeps_orientation: Held::new(false),
             is_sensed: Held::new(false),
+            off_zero: Held::new(OffZero::default()),
             beside: Held::new(BTreeSet::new()),
         }
     }
@@ -193,6 +197,7 @@ impl Active {
         self.tool_in_room.or_passed_by(&end.tool_in_room, |_, _| true);
         self.keeps_orientation.or_passed_by(&end.keeps_orientation, |_, _| true);
         self.is_sensed.or_passed_by(&end.is_sensed, |_, _| true);
+        self.off_zero.or_passed_by(&end.off_zero, OffZero::either);
         self.beside.or_passed_by(&end.beside, |one, other| one | other);
     }
 
@@ -213,6 +218,7 @@ impl Followed for Active {
             tool_in_room: self.tool_in_room.merged(&other.tool_in_room, |_, _| true),
             keeps_orientation: self.keeps_orientation.merged(&other.keeps_orientation, |_, _| true),
             is_sensed: self.is_sensed.merged(&other.is_sensed, |_, _| true),
+            off_zero: self.off_zero.merged(&other.off_zero, OffZero::either),
             beside: self.beside.merged(&other.beside, |one, other| one | other),
         }
     }
@@ -224,6 +230,7 @@ impl Followed for Active {
             tool_in_room: self.tool_in_room.at_top(),
             keeps_orientation: self.keeps_orientation.at_top(),
             is_sensed: self.is_sensed.at_top(),
+            off_zero: self.off_zero.at_top(),
             beside: self.beside.at_top(),
         }
     }
@@ -235,6 +242,7 @@ impl Followed for Active {
             tool_in_room: self.tool_in_room.behind_call(&end.tool_in_room),
             keeps_orientation: self.keeps_orientation.behind_call(&end.keeps_orientation),
             is_sensed: self.is_sensed.behind_call(&end.is_sensed),
+            off_zero: self.off_zero.behind_call(&end.off_zero),
             beside: self.beside.behind_call(&end.beside),
         }
     }

@@ -6,6 +6,7 @@ mod beside;
 mod called;
 mod calls;
 mod copies;
+mod external;
 mod frames;
 mod given;
 mod motions;
@@ -30,6 +31,7 @@ use scopes::Scopes;
 use uses::Uses;
 
 use super::ProgramSetting;
+use super::external::OffZero;
 use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::names::{plain_error, plain_names};
@@ -110,6 +112,7 @@ fn reading(
         flow: Flow::new(known).among(&routines(files)?),
         motion_data: None,
         path_data: None,
+        off_zero_anywhere: OffZero::default(),
         spline: None,
         resumes: false,
         copies: BTreeMap::new(),
@@ -119,6 +122,7 @@ fn reading(
     let mut references = References::default();
     for (index, file) in files.iter().enumerate() {
         module.assigned.look_through(reader(index, file)?, !has_moves(file));
+        external::look_through(&mut module.off_zero_anywhere, reader(index, file)?);
         if has_moves(file) {
             module.uses.look_through(reader(index, file)?);
             module.resumes |= calls::resumes(reader(index, file)?);
@@ -164,6 +168,8 @@ struct Module<'a> {
     motion_data: Option<Option<Aggregate>>,
     /// Whether the tool keeps its orientation by the data of a path (`LDAT_ACT`); `None` where nothing stated them.
     path_data: Option<bool>,
+    /// External axes that the files put elsewhere than at zero.
+    off_zero_anywhere: OffZero,
     /// Frames of the spline block that is open.
     spline: Option<OwnFrames>,
     /// True where an interrupt may leave the routines that it has come upon.
@@ -179,7 +185,7 @@ impl Module<'_> {
     fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
         self.start_afresh();
         self.flow.file_begins(reader.index);
-        (self.now, self.motion_data, self.path_data, self.spline) = (unset(), None, None, None);
+        (self.now, self.motion_data, self.path_data, self.spline) = (self.begun(), None, None, None);
         let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
             let Some(word) = reader.name() else {
@@ -199,7 +205,10 @@ impl Module<'_> {
             } else if moves && RELATIVE.contains(&word.as_str()) {
                 let why = Why::new(LeftReason::Relative, "it is relative to the position before");
                 self.leave_at(reader.index, reader.line(), &word, why);
+                self.may_carry();
                 self.time_passes();
+            } else if moves && word == external::BESIDE {
+                self.may_carry();
             } else if moves && is_beside(&reader) {
                 self.sets_beside(&mut reader);
             } else if moves && self.flow(&reader, &word) {
@@ -319,7 +328,8 @@ impl Module<'_> {
                 let Some(name) = routine_name(reader) else { return false };
                 self.start_afresh();
                 self.copies = BTreeMap::new();
-                self.flow.routine_begins(name, &mut self.now, &unset());
+                let uncalled = self.begun();
+                self.flow.routine_begins(name, &mut self.now, &uncalled);
             }
             "RETURN" => self.flow.returns(&self.now),
             "GOTO" => self.flow.jumps(&self.now),
@@ -360,6 +370,7 @@ impl Module<'_> {
             [&active.tool, &active.base].map(|is| is.value.at_some_time("a GOTO may come from elsewhere"));
         active.set(Frames { tool, base, tool_in_room: active.tool_in_room.value });
         self.now.0 = active;
+        self.may_carry();
         self.flow.arrives();
         self.way.lose(&mut self.now.1);
     }
@@ -405,6 +416,7 @@ impl Module<'_> {
         if let Some((name, value)) = a.foreign(axes).filter(|_| !self.setting.axes_apart) {
             return Err(Why::external(&name, value));
         }
+        self.keeps_at_zero(a)?;
         let frame = |reason, name: &str, is: &FrameIs, stated: Option<Pose>, flag: &str| {
             is.or_stated(stated).ok_or_else(|| Why::new(reason, is.why(name, flag)))
         };

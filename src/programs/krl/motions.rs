@@ -89,6 +89,9 @@ impl Module<'_> {
         let elements = self.elements(value);
         // Which element of several the robot goes to, the text does not tell.
         let several = elements.len() > 1;
+        if several {
+            self.may_carry();
+        }
         for value in elements {
             if several {
                 self.way.lose(&mut self.now.1);
@@ -98,8 +101,12 @@ impl Module<'_> {
                 let points = self.points_in(&value, motion.place.0, motion.place.1);
                 self.leave_at(motion.place.0, motion.place.1, motion.name, why.starting_from(points));
             }
-            if several {
-                self.way.lose(&mut self.now.1);
+            match several {
+                true => {
+                    self.may_carry();
+                    self.way.lose(&mut self.now.1);
+                }
+                false => self.carries(&value),
             }
         }
     }
@@ -114,6 +121,7 @@ impl Module<'_> {
             _ => format!("{name} is a variable of the controller: what it holds, the text does not tell"),
         };
         self.leave_at(motion.place.0, motion.place.1, motion.name, Why::of(name, LeftReason::Undeclared, words));
+        self.may_carry();
         self.way.lose(&mut self.now.1);
     }
 

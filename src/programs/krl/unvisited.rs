@@ -8,6 +8,7 @@ use crate::programs::reason::{DeclaredPoint, LeftReason, Why};
 impl Module<'_> {
     /// Declared positions that no motion of the files goes to and that are no frames: by their own motion data (`XP1` with `FP1`), or by the flags.
     pub(super) fn unvisited(&mut self) {
+        self.now.0 = self.begun().0;
         for (name, file, line) in std::mem::take(&mut self.declared) {
             let Some(Value::Aggregate(a)) = self.values.get(&name).filter(|_| !self.uses.is_frame(&name)) else {
                 continue;

@@ -43,6 +43,7 @@ impl Task<'_> {
         }
         for element in elements {
             self.way.lose(self.switching.stands());
+            self.may_carry();
             if let Err(why) = self.visit(&Node::Word(element), name, from, tool, work)? {
                 self.leave(from, name, why);
             }

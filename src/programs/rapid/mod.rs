@@ -2,6 +2,7 @@
 
 mod array;
 mod calls;
+mod carried;
 mod frames;
 mod moves;
 mod scopes;
@@ -396,6 +397,7 @@ impl Task<'_> {
         if let Some((axis, value)) = foreign_axis(&external, axes.len()).filter(|_| !self.setting.axes_apart) {
             return Err(Why::external(&axis, value));
         }
+        self.keeps_at_zero(&external)?;
         let has_external = external.iter().any(|(value, _)| *value < NO_AXIS);
         if *self.switching.now().offset.value() && has_external && !self.setting.axes_apart {
             let words = "an offset of external axes (EOffsOn, EOffsSet) may be active";

@@ -1,6 +1,7 @@
 //! Statements of RAPID: where each begins and ends, and which of them move.
 
 use super::Task;
+use super::carried::ALONE;
 use super::moves::{Targets, targets_of};
 use super::switching::{ROUTINES, words_before_name};
 use super::value::{Node, TYPES, node};
@@ -259,6 +260,10 @@ impl Task<'_> {
         if has_literal(reader, end)? {
             let words = format!("a position stands in it, and what {word} does with it is not known");
             self.leave((reader.index, reader.line()), word, Why::new(LeftReason::NotATarget, words));
+            self.may_carry();
+        }
+        if word == ALONE {
+            self.may_carry();
         }
         let start = reader.at;
         let used = self.used(reader, word, end);
@@ -288,6 +293,10 @@ impl Task<'_> {
             };
             if let Err(why) = done {
                 self.leave((reader.index, line), &name, why);
+            }
+            match is_whole {
+                true => self.carries(value),
+                false => self.may_carry(),
             }
         }
         self.is_led = false;

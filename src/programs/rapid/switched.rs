@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::programs::external::OffZero;
 use crate::programs::flow::{Either, Followed, Held};
 use crate::programs::scan::Reader;
 
@@ -98,6 +99,8 @@ pub(super) struct Switched {
     pub offset: Switch<bool>,
     /// True where axis 4 may be locked, so that the tool turns as it can.
     pub locked: Switch<bool>,
+    /// External axes that do not stand at zero.
+    pub off_zero: Switch<OffZero>,
     /// Trap routines that an interrupt may run at any time.
     pub beside: Switch<BTreeSet<String>>,
 }
@@ -106,7 +109,14 @@ impl Switched {
     /// Where nothing has switched anything yet.
     pub fn new(watched: [Watched; 2], [displaced, offset, locked]: [bool; 3]) -> Self {
         let [displaced, offset, locked] = [displaced, offset, locked].map(Switch::new);
-        Self { watched: watched.map(Switch::new), displaced, offset, locked, beside: Switch::new(BTreeSet::new()) }
+        Self {
+            watched: watched.map(Switch::new),
+            displaced,
+            offset,
+            locked,
+            off_zero: Switch::new(OffZero::default()),
+            beside: Switch::new(BTreeSet::new()),
+        }
     }
 
     /// Notes what another has passed through.
@@ -115,6 +125,7 @@ impl Switched {
         self.displaced.note(&other.displaced);
         self.offset.note(&other.offset);
         self.locked.note(&other.locked);
+        self.off_zero.note(&other.off_zero);
         self.beside.note(&other.beside);
     }
 
@@ -124,6 +135,7 @@ impl Switched {
         self.displaced.or_left_by(&end.displaced);
         self.offset.or_left_by(&end.offset);
         self.locked.or_left_by(&end.locked);
+        self.off_zero.or_left_by(&end.off_zero);
         self.beside.or_left_by(&end.beside);
     }
 
@@ -135,6 +147,7 @@ impl Switched {
             displaced: self.displaced.anywhere(&top.displaced),
             offset: self.offset.anywhere(&top.offset),
             locked: self.locked.anywhere(&top.locked),
+            off_zero: self.off_zero.anywhere(&top.off_zero),
             beside: self.beside.anywhere(&top.beside),
         }
     }
@@ -147,6 +160,7 @@ impl Followed for Switched {
             displaced: self.displaced.merged(&other.displaced),
             offset: self.offset.merged(&other.offset),
             locked: self.locked.merged(&other.locked),
+            off_zero: self.off_zero.merged(&other.off_zero),
             beside: self.beside.merged(&other.beside),
         }
     }
@@ -157,6 +171,7 @@ impl Followed for Switched {
             displaced: self.displaced.at_top(),
             offset: self.offset.at_top(),
             locked: self.locked.at_top(),
+            off_zero: self.off_zero.at_top(),
             beside: self.beside.at_top(),
         }
     }
@@ -167,6 +182,7 @@ impl Followed for Switched {
             displaced: self.displaced.behind_call(&end.displaced),
             offset: self.offset.behind_call(&end.offset),
             locked: self.locked.behind_call(&end.locked),
+            off_zero: self.off_zero.behind_call(&end.off_zero),
             beside: self.beside.behind_call(&end.beside),
         }
     }

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
+use super::carried::external_axes;
 use super::switched::{DISPLACES, OFFSETS, Switched, Watched, locks, switch};
+use crate::programs::external::OffZero;
 use crate::programs::flow::{Branching, Flow, Followed, Places};
 use crate::programs::itinerary::{Itinerary, Stands};
 use crate::programs::routines::Routines;
@@ -56,6 +58,8 @@ pub(super) struct Switching {
     offsets: bool,
     /// True where a routine locks axis 4.
     locks: bool,
+    /// External axes that the texts put elsewhere than at zero, at places that count as not known.
+    pub off_zero_anywhere: OffZero,
     /// Trap routines of all texts that interrupts run.
     connected: BTreeSet<String>,
     now: Now,
@@ -78,6 +82,7 @@ impl Switching {
             displaces: false,
             offsets: false,
             locks: false,
+            off_zero_anywhere: OffZero::default(),
             connected: BTreeSet::new(),
             now,
             top,
@@ -100,6 +105,14 @@ impl Switching {
     /// What holds here.
     pub fn now(&self) -> &Switched {
         &self.now.0
+    }
+
+    /// Where a move leaves the external axes.
+    pub fn axes_are(&mut self, off_zero: OffZero) {
+        if off_zero != *self.now.0.off_zero.value() {
+            self.now.0.off_zero.set(off_zero);
+            self.top.note(&self.now.0);
+        }
     }
 
     /// Where the robot stands.
@@ -129,6 +142,7 @@ impl Switching {
             self.displaces |= is_of(DISPLACES);
             self.offsets |= is_of(OFFSETS);
             self.locks |= locks(&reader) == Some(true);
+            external_axes(&mut self.off_zero_anywhere, &mut reader);
             connected(&reader).iter().for_each(|trap| self.connected.extend(self.flow.meant(trap)));
             reader.at += 1;
         }
@@ -203,6 +217,8 @@ impl Switching {
         let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
         let on = [self.displaces, self.offsets, self.locks].map(|on| on && is_displaced);
         let mut any = Switched::new(self.switched_off.map(state), on);
+        // What ran before may have left them anywhere.
+        any.off_zero.begin(self.off_zero_anywhere.clone());
         if is_displaced {
             any.beside.begin(self.connected.clone());
         }

@@ -82,6 +82,7 @@ impl Task<'_> {
 
     /// Declared targets to which no move of the files goes.
     pub(super) fn unvisited(&mut self) {
+        self.may_carry();
         let all: Vec<(String, Datum)> = self.data.iter().map(|(n, d)| (n.clone(), d.clone())).collect();
         for (name, datum) in all.into_iter().filter(|(_, d)| d.kind.ends_with("TARGET")) {
             let seen =

@@ -30,6 +30,12 @@ impl Node {
         has_shape(parts, &ROBTARGET) && parts[..2].iter().all(|part| matches!(part, Self::List(_)))
     }
 
+    /// Axes of the arm, and external ones.
+    pub fn is_jointtarget(&self) -> bool {
+        let Self::List(parts) = self else { return false };
+        has_shape(parts, &JOINTTARGET) && parts.iter().all(|part| matches!(part, Self::List(_)))
+    }
+
     /// How many values stand in its brackets.
     fn count(&self) -> usize {
         if let Self::List(values) = self { values.len() } else { 0 }
@@ -38,6 +44,9 @@ impl Node {
 
 /// Numbers in the parts of a robtarget.
 const ROBTARGET: [usize; 4] = [3, 4, 4, 6];
+
+/// Numbers in the parts of a jointtarget.
+const JOINTTARGET: [usize; 2] = [6, 6];
 
 /// True where all parts that are no lists of so many values are computed: `[p.trans, p.rot, ..]`.
 fn has_shape(parts: &[Node], shape: &[usize]) -> bool {
@@ -209,7 +218,7 @@ pub(super) fn undeclared(name: &str) -> Why {
 pub(super) fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result<()> {
     let shape: &[usize] = match kind {
         "ROBTARGET" => &ROBTARGET,
-        "JOINTTARGET" => &[6, 6],
+        "JOINTTARGET" => &JOINTTARGET,
         _ => return Ok(()),
     };
     let Node::List(parts) = value else { return Ok(()) };
@@ -245,7 +254,12 @@ pub(super) fn is_of_external_axes(target: &Node) -> bool {
 
 /// The first external axis behind the `known` axes, the robot's six included, that is not at zero.
 pub(super) fn foreign_axis(external: &[(f64, Range<usize>); 6], known: usize) -> Option<(String, f64)> {
-    let foreign = external.iter().map(|(value, _)| *value).zip("abcdef".chars()).skip(known.saturating_sub(6));
-    let mut off_zero = foreign.filter(|(value, _)| *value != 0.0 && *value < NO_AXIS);
-    off_zero.next().map(|(value, letter)| (format!("eax_{letter}"), value))
+    let foreign = external.iter().map(|(value, _)| *value).enumerate().skip(known.saturating_sub(6));
+    let mut off_zero = foreign.filter(|(_, value)| *value != 0.0 && *value < NO_AXIS);
+    off_zero.next().map(|(axis, value)| (external_name(axis), value))
+}
+
+/// Name of an external axis by its number from 0.
+pub(super) fn external_name(axis: usize) -> String {
+    "abcdef".chars().nth(axis).map_or_else(String::new, |letter| format!("eax_{letter}"))
 }

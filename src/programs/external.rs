@@ -1,0 +1,58 @@
+//! External axes of which the description knows nothing: where statements have left them.
+
+use std::collections::BTreeMap;
+
+use super::held::Either;
+use super::reason::Why;
+
+/// Those that may stand elsewhere than at zero, by their number from 0: in the unit of the program, `None` where the text does not tell where.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct OffZero(BTreeMap<usize, Option<f64>>);
+
+impl OffZero {
+    /// A target moves an axis.
+    pub fn put(&mut self, axis: usize, place: Option<f64>) {
+        match place {
+            Some(0.0) => _ = self.0.remove(&axis),
+            _ => _ = self.0.insert(axis, place),
+        }
+    }
+
+    /// Why a pose stays as it is that leaves an axis out: one of which `leaves_out` is true stands elsewhere than at zero, or may do so.
+    pub fn why_kept(&self, leaves_out: impl Fn(usize) -> bool, name: impl Fn(usize) -> String) -> Option<Why> {
+        let (axis, place) = self.0.iter().find(|(axis, _)| leaves_out(**axis))?;
+        Some(Why::external_kept(&name(*axis), *place))
+    }
+}
+
+/// One of several ways: an axis that stands at zero on one of them only may stand elsewhere.
+impl Either for OffZero {
+    fn either(&self, other: &Self) -> Self {
+        let place = |of: &Self, axis: &usize| of.0.get(axis).copied().unwrap_or(Some(0.0));
+        let one = |axis: &usize| {
+            let (own, other) = (place(self, axis), place(other, axis));
+            (*axis, own.filter(|_| own == other))
+        };
+        Self(self.0.keys().chain(other.0.keys()).map(one).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_axis_that_is_at_zero_on_one_way_only_may_stand_anywhere() {
+        let mut rail = OffZero::default();
+        rail.put(0, Some(500.0));
+        rail.put(1, Some(20.0));
+        rail.put(1, Some(0.0));
+        assert_eq!(rail, OffZero(BTreeMap::from([(0, Some(500.0))])));
+        let unknown = OffZero(BTreeMap::from([(0, None)]));
+        assert_eq!(rail.either(&OffZero::default()), unknown);
+        assert_eq!(OffZero::default().either(&rail), unknown);
+        assert_eq!(rail.either(&unknown), unknown);
+        assert_eq!(rail.either(&rail), rail);
+        assert_eq!(rail.why_kept(|axis| axis == 1, |_| String::new()), None);
+    }
+}
