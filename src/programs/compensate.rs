@@ -192,7 +192,7 @@ fn taught(target: &Target, controller: &Robot) -> Option<(f64, f64)> {
 }
 
 /// Columns that a table gains stay empty in the rows that are left as they are.
-fn empty_cells(target: &Target) -> Vec<Edit> {
+pub(super) fn empty_cells(target: &Target) -> Vec<Edit> {
     let TargetKind::Pose(pose) = &target.kind else { return Vec::new() };
     let missing = pose.joint_fields.iter().flatten().filter_map(|field| match &field.place {
         FieldPlace::Missing(at, words) => Some(Edit { file: field.file, range: *at..*at, text: words.clone() }),

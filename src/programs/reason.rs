@@ -111,7 +111,7 @@ impl Why {
     }
 
     /// An external axis of which the description knows nothing stands elsewhere than at zero.
-    pub(super) fn external(axis: &str, value: f64) -> Self {
+    pub(super) fn external(axis: &str, value: impl std::fmt::Display) -> Self {
         let words = format!(
             "{axis} is {value}, and the description has no such axis: it may carry the robot or the work (give a description that has it, or --axes-apart where it does neither)"
         );

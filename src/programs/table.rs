@@ -2,15 +2,21 @@
 //!
 //! Joint targets have one column for every joint, named as in the URDF. Flange poses have `x_m,y_m,z_m,qx,qy,qz,qw`; they get joint
 //! columns with the result, and joint columns that are there already say which posture is meant.
+//! Columns `E1`, `eax_a`, `ext1` beside a pose are external axes that the description lacks.
 
 use std::ops::Range;
 use std::path::Path;
 
 use super::ProgramSetting;
+use super::compensate::empty_cells;
+use super::external::OffZero;
 use super::field::{Edit, Field, FieldPlace};
-use super::program::{Approach, JointTarget, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind};
+use super::program::{
+    Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind,
+};
+use super::reason::Why;
 use super::text_file::TextFile;
-use crate::error::{Code, Error, Result, closest_name, renaming};
+use crate::error::{Code, Error, Notice, Result, closest_name, renaming};
 use crate::geom::Pose;
 use crate::series::{AngleUnit, check_unit};
 use crate::urdf::JointKind;
@@ -75,6 +81,22 @@ struct Columns {
     pose: Option<[usize; 7]>,
     /// Column of every reading; empty where there are none.
     joints: Vec<usize>,
+    /// External axes that the description lacks.
+    external: Vec<usize>,
+}
+
+impl Columns {
+    fn is_read(&self, column: usize) -> bool {
+        self.pose.is_some_and(|pose| pose.contains(&column))
+            || [&self.joints, &self.external].iter().any(|columns| columns.contains(&column))
+    }
+}
+
+/// True for the name of a column of an external axis: `E1` of KRL, `eax_a` of RAPID, `ext..`.
+fn is_external(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    name.strip_prefix('e').is_some_and(is_number) || name.starts_with("eax_") || name.starts_with("ext")
 }
 
 fn columns(file: &TextFile, header: &Row, setting: &ProgramSetting<'_>) -> Result<Columns> {
@@ -112,7 +134,9 @@ fn columns(file: &TextFile, header: &Row, setting: &ProgramSetting<'_>) -> Resul
         let remedy = format!("name them {}, or {}", readings.join(", "), POSE_COLUMNS.join(", "));
         return Err(Error::new(Code::CsvColumnMissing, place(), what, remedy));
     }
-    Ok(Columns { names, pose, joints })
+    let is_extra = |i: &usize| pose.is_some() && !joints.contains(i) && is_external(&names[*i]);
+    let external = (0..names.len()).filter(is_extra).collect();
+    Ok(Columns { names, pose, joints, external })
 }
 
 /// Reads one table.
@@ -135,11 +159,21 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
             let names = setting.chain.readings.iter().map(|n| format!("{}{}", char::from(separator), quoted(n)));
             program.edits.push(Edit { file: index, range: header.end..header.end, text: names.collect() });
         }
-        for (k, row) in rows.iter().enumerate() {
-            let approach = if k > 0 { Approach::From(targets.len() - 1) } else { Approach::Unknown };
-            targets.push(table.target(row, approach)?);
+        let (mut from, mut off_zero) = (Approach::Unknown, OffZero::default());
+        for row in rows {
+            let target = table.target(row, from)?;
+            let why = table.external(row, &mut off_zero).filter(|_| !setting.axes_apart);
+            let Some(why) = why else {
+                from = Approach::From(targets.len());
+                targets.push(target);
+                continue;
+            };
+            program.edits.extend(empty_cells(&target));
+            program.left.push(Left { file: index, line: row.line, name: target.name, why });
+            from = from.beyond();
         }
         table.check_unit(&targets)?;
+        program.notices.extend(table.unread(rows));
     }
     program.targets = targets;
     Ok(program)
@@ -171,6 +205,34 @@ impl Table<'_> {
         };
         let name = format!("row {}", row.line);
         Ok(Target { approach, ..Target::at((self.index, row.line), name, kind) })
+    }
+
+    /// Why the pose of a row stays as it is: an axis that the description lacks is not at zero, in its cell or where an empty one leaves it.
+    fn external(&self, row: &Row, off_zero: &mut OffZero) -> Option<Why> {
+        let name = |column: usize| self.columns.names[column].clone();
+        let cells = self.columns.external.iter().map(|&column| (column, self.cell(row, column)));
+        let (empty, written): (Vec<_>, Vec<_>) = cells.partition(|(_, cell)| cell.is_empty());
+        for (column, cell) in &written {
+            off_zero.put(*column, cell.parse::<f64>().ok().filter(|value| value.is_finite()));
+        }
+        let moved = written.iter().find(|(_, cell)| cell.parse::<f64>().ok() != Some(0.0));
+        moved
+            .map(|(column, cell)| Why::external(&name(*column), cell))
+            .or_else(|| off_zero.why_kept(|column| empty.iter().any(|(is_empty, _)| *is_empty == column), name))
+    }
+
+    /// Columns with numbers of which nothing is read.
+    fn unread(&self, rows: &[Row]) -> Option<Notice> {
+        let is_number = |column: &usize| rows.iter().any(|row| self.cell(row, *column).parse::<f64>().is_ok());
+        let unread = (0..self.columns.names.len()).filter(|column| !self.columns.is_read(*column)).filter(is_number);
+        let names: Vec<&str> = unread.map(|column| self.columns.names[column].as_str()).collect();
+        let what = format!("columns of no joint and of no pose: {}", names.join(", "));
+        let remedy = "they stay as they are, and are not read";
+        (!names.is_empty()).then(|| Notice::new(Code::JointUnused, &self.file.name, what, remedy))
+    }
+
+    fn cell(&self, row: &Row, column: usize) -> String {
+        String::from_utf8_lossy(&self.file.bytes[row.cells[column].clone()]).into_owned()
     }
 
     fn joints(&self, row: &Row) -> Result<JointTarget> {
@@ -269,7 +331,7 @@ impl Table<'_> {
 
     fn field(&self, row: &Row, column: usize, si: f64, decimals: usize) -> Result<Field> {
         let range = row.cells[column].clone();
-        let cell = String::from_utf8_lossy(&self.file.bytes[range.clone()]);
+        let cell = self.cell(row, column);
         let written = cell.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
             let place = format!("{}:{}", self.file.name, row.line);
             let what = format!("column {}: \"{cell}\" is not a number", self.columns.names[column]);

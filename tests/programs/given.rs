@@ -6,6 +6,7 @@ use std::process::Command;
 use crate::programs_support::{Cell, Run, findings};
 use crate::robots::repo;
 use robotcal::Code;
+use robotcal::programs::LeftReason;
 
 /// `compensate` with these descriptions, base and tool nominal.
 fn compensate(cell: &Cell, file: &Path, nominal: &Path, urdf: &Path, flags: &[&str]) -> Run {
@@ -58,6 +59,29 @@ fn line_ends_without_line_feed_are_line_ends() {
         let old_style = run(&text.replace('\n', "\r"));
         assert_eq!(old_style.replace('\r', "\n"), run(&text));
         assert_ne!(run(&text), text);
+    }
+}
+
+/// Columns of external axes beside poses; an empty cell leaves the axis where it is.
+#[test]
+fn rows_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_at_zero() {
+    let cell = Cell::kuka(125);
+    let pose = cell.nominal.base_from_tip(&[0.17, -1.4, 1.7, 0.35, 0.7, 0.5]);
+    let flange: Vec<String> = pose.xyz().iter().chain(&pose.quaternion_xyzw()).map(|v| format!("{v:.9}")).collect();
+    let external = LeftReason::ExternalAxis.name();
+    for name in ["E1", "eax_a", "ext_1"] {
+        let mut table = format!("name,x_m,y_m,z_m,qx,qy,qz,qw,{name},speed\n");
+        ["0", "500", "", "0.0", ""].iter().for_each(|at| table += &format!("P,{},{at},250\n", flange.join(",")));
+        let file = cell.write("t.csv", table.as_bytes());
+        let run = cell.compensate(&[&file], &["--joint-unit", "deg", "--unordered"]).expect(1);
+        let left: Vec<(usize, String)> = run.told().left.into_iter().map(|(line, _, reason)| (line, reason)).collect();
+        assert_eq!(left, [(3, external.to_owned()), (4, external.to_owned())], "{}", run.said());
+        assert_eq!(run.told().corrected, 3);
+        assert!(run.said().contains(Code::JointUnused.name()), "{}", run.said());
+        let columns: Vec<usize> = run.text("t.csv").lines().map(|line| line.split(',').count()).collect();
+        assert_eq!(columns, [16; 6], "every row has all cells");
+        let apart = cell.compensate(&[&file], &["--joint-unit", "deg", "--unordered", "--axes-apart"]).expect(0);
+        assert_eq!(apart.told().corrected, 5);
     }
 }
 
