@@ -32,7 +32,7 @@ pub use context::{Context, Offsets, Poses};
 #[cfg(feature = "draw")]
 pub use drawing::{overlay, plate_drawing};
 pub use frames::{frame_files, frame_findings, frames_record, work_findings};
-pub use judgement::{comparison, corrections, difference, parameter_words, verdict};
+pub use judgement::{comparison, corrections, difference, parameter_words, verdict, written_programs};
 pub use names::folder_name;
 pub use plan::{plan_files, plan_programs, plan_start, touch_plan};
 #[cfg(feature = "report")]

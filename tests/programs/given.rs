@@ -62,6 +62,36 @@ fn line_ends_without_line_feed_are_line_ends() {
     }
 }
 
+/// What the record beside a program says of it; one that was written by hand since is only named.
+#[test]
+fn a_program_that_is_corrected_already_is_not_corrected_twice() {
+    let mut cell = Cell::kuka(124);
+    let axes = |q: &[f64]| {
+        q.iter().enumerate().map(|(k, v)| format!("A{} {:.4}", k + 1, v.to_degrees())).collect::<Vec<_>>().join(",")
+    };
+    let text = format!("DEF a()\nPTP {{{}}}\nEND\n", axes(&cell.readings()));
+    let first = cell.write("a.src", text.as_bytes());
+    let run = cell.compensate(&[&first], &["--unordered"]).expect(0);
+    assert_eq!(weight(&run, Code::ProgramWritten).as_deref(), Some("note"));
+    assert_eq!(weight(&run, Code::CorrectedAlready), None);
+    let (corrected, out) = (run.out.join("a.src"), cell.folder.path().join("twice"));
+    let again = |flags: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
+        command.arg("compensate").arg(&corrected).arg("--out").arg(&out).arg("--nominal").arg(&cell.nominal_urdf);
+        command.arg("--urdf").arg(&cell.real_urdf).arg("--compensation").arg(&cell.compensation);
+        command.args(["--frames", "nominal", "--base", "base_link", "--tip", "tool0", "--unordered"]);
+        Run { output: command.args(flags).output().unwrap(), out: out.clone() }
+    };
+    let twice = again(&[]).expect(1);
+    assert_eq!(weight(&twice, Code::CorrectedAlready).as_deref(), Some("gate"), "{}", twice.said());
+    // Taught on a robot for which it was corrected.
+    let taught = again(&["--from", cell.nominal_urdf.to_str().unwrap()]);
+    assert_eq!(weight(&taught, Code::CorrectedAlready).as_deref(), Some("note"), "{}", taught.said());
+    std::fs::write(&corrected, format!("{text}; by hand\n")).unwrap();
+    let by_hand = again(&[]).expect(0);
+    assert_eq!(weight(&by_hand, Code::CorrectedAlready).as_deref(), Some("note"), "{}", by_hand.said());
+}
+
 /// Columns of external axes beside poses; an empty cell leaves the axis where it is.
 #[test]
 fn rows_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_at_zero() {

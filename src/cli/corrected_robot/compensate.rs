@@ -8,7 +8,7 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
 use super::compensate_frames::{Choice, Side, Sides, known_error};
-use super::compensate_models::{equal, exchanged, not_given};
+use super::compensate_models::{corrected_already, equal, exchanged, not_given};
 use crate::cli::Verdict;
 use crate::cli::flags::robot::noted_chain;
 use crate::cli::terminal::say::{self, say, say_line};
@@ -19,6 +19,7 @@ use crate::geom::Pose;
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
 use crate::output::corrections::{self, FileFinding, TABLE};
+use crate::output::written_programs::WrittenProgram;
 use crate::output::{ResultFolder, compensated};
 use crate::programs::{
     self, Correction, Language, Left, Models, Postures, Program, ProgramSetting, Target, TargetKind, TargetOutcome,
@@ -196,6 +197,8 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     let left = done.left(&program);
     let expected = choice.expected(&sides, &framed, &program, &done)?;
     let mut findings = model_findings(args, nominal, &models, &sides)?;
+    let read = args.programs.iter().zip(&program.files);
+    findings.extend(read.filter_map(|(path, file)| corrected_already(path, file, args.from.is_some())));
     findings.extend(corrections::nominal_findings(&program, &done));
     findings.extend(corrections::displaced_finding(&program, &done));
     let subject = args.urdf.display().to_string();
@@ -209,12 +212,15 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     findings.extend(corrections::left_finding(&left, &subject));
     findings.extend(corrections::missing_finding(&program, &left, &subject));
     let report = corrections::table(&program, &done, expected.as_deref().ok(), &controller.chain);
-    let said = corrections::findings_json(&findings)?;
     let mut written: Vec<(String, &[u8])> = Vec::new();
     for (path, bytes) in args.programs.iter().zip(&done.files) {
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         written.push((name, bytes));
     }
+    let is_changed = |(file, new): &(&TextFile, &(String, &[u8]))| file.bytes != new.1;
+    let changed = program.files.iter().zip(&written).filter(is_changed);
+    let records: Vec<_> = changed.map(|(_, (name, bytes))| WrittenProgram::new(name, bytes)).collect();
+    let said = corrections::findings_json(&findings, &records)?;
     written.push((corrections::TABLE.to_owned(), report.as_bytes()));
     written.push((corrections::FINDINGS.to_owned(), said.as_bytes()));
     place.write_beside(&written, &args.programs)?;

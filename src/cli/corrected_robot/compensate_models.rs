@@ -1,4 +1,4 @@
-//! Whether the descriptions that `compensate` was given are those that were meant.
+//! Whether the descriptions and the programs that `compensate` was given are those that were meant.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,6 +10,8 @@ use crate::geom::Pose;
 use crate::model::robot::Robot;
 use crate::output::compensated;
 use crate::output::corrections::FileFinding;
+use crate::output::written_programs::{WrittenAs, written_as};
+use crate::programs::TextFile;
 use crate::urdf::Chain;
 
 /// Beside a corrected description.
@@ -38,6 +40,23 @@ pub(super) fn equal(made_for: &Robot, sides: &Sides) -> Option<FileFinding> {
     );
     let is_same = has_origins(&robot.chain, of_other) && robot.terms == made_for.terms;
     is_same.then(|| finding(Code::ModelsEqual, Weight::Gate, urdf, text))
+}
+
+/// A program is what an earlier correction wrote: for the nominal robot it would be corrected twice. One that was taught on a real robot
+/// (`--from`) may be.
+pub(super) fn corrected_already(path: &Path, file: &TextFile, is_taught: bool) -> Option<FileFinding> {
+    let (weight, is) = match written_as(path, &file.bytes)? {
+        WrittenAs::Itself if !is_taught => (Weight::Gate, "is a corrected program, and would be corrected twice"),
+        WrittenAs::Itself => {
+            (Weight::Note, "is a corrected program: right where it was corrected for the robot of --from")
+        }
+        WrittenAs::Other => (
+            Weight::Note,
+            "has the name of a corrected program that the records beside it list: was it made of that, it is corrected twice",
+        ),
+    };
+    let text = format!("{} {is} (give the program from which it was made)", path.display());
+    Some(finding(Code::CorrectedAlready, weight, path, text))
 }
 
 /// `--nominal` is what a solution made of `--urdf`.

@@ -266,13 +266,14 @@ pub fn expected_findings(
 ///
 /// # Errors
 /// None in practice: every field can be written as JSON.
-pub fn findings_json(findings: &[FileFinding]) -> Result<String> {
-    let line = |f: &FileFinding| {
-        serde_json::to_string(f)
-            .map_err(|e| crate::error::Error::new(Code::RecordNotWritten, FINDINGS, e, "report this"))
-    };
-    let lines: Vec<String> = findings.iter().map(line).collect::<Result<_>>()?;
+pub fn findings_json(findings: &[FileFinding], written: &[impl Serialize]) -> Result<String> {
+    let lines: Vec<String> = findings.iter().map(line).chain(written.iter().map(line)).collect::<Result<_>>()?;
     Ok(format!("[\n{}\n]\n", lines.join(",\n")))
+}
+
+fn line(finding: &impl Serialize) -> Result<String> {
+    let error = |e| crate::error::Error::new(Code::RecordNotWritten, FINDINGS, e, "report this");
+    serde_json::to_string(finding).map_err(error)
 }
 
 /// One row for every target: what the correction is, or why there is none.

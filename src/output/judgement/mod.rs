@@ -8,3 +8,4 @@ pub mod corrections;
 pub mod difference;
 pub mod parameter_words;
 pub mod verdict;
+pub mod written_programs;
