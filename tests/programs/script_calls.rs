@@ -101,6 +101,12 @@ fn positions_that_a_call_in_none_of_the_files_is_given_are_left() {
         ("", "  camera=rpc_factory(\"xmlrpc\",\"http://a\")\n  camera.look(@)\n".to_owned(), 0, vec![]),
         ("", "  w=@\n  cap_height(w[2])\n".to_owned(), 0, vec![]),
         ("", "  cap_close(40)\n  movel(@)\n".to_owned(), 1, vec![]),
+        // Joint values are a position where the name is that of a motion.
+        ("", format!("  my_movej({START:?})\n"), 0, vec![no_target]),
+        ("", format!("  moveh([0, -1.2, d2r(9), 0.5, -1, 0.1], a=1)\n{home}"), 1, vec![no_target]),
+        ("", format!("  q={START:?}\n  my_movej(q)\n"), 0, vec![no_target]),
+        ("", format!("  q={START:?}\n  movej(q)\n  my_movej(q)\n"), 1, vec![]),
+        ("", format!("  set_limits({START:?})\n  my_movej([1,2,3])\n{home}"), 1, vec![]),
     ] {
         assert_told(&cell, (routines, &body), corrected, &left);
     }

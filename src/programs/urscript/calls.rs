@@ -7,7 +7,7 @@ use super::{MOVES, Script, Value};
 use crate::programs::field::FieldPlace;
 use crate::programs::program::Left;
 use crate::programs::reason::{LeftReason, Why};
-use crate::programs::scan::{Reader, TokenKind};
+use crate::programs::scan::{Reader, Token, TokenKind};
 
 /// Calls behind which the robot stands elsewhere; true where it keeps its posture, because the tool moves a little or on a path.
 const ELSEWHERE: [(&str, bool); 5] =
@@ -69,6 +69,28 @@ const READ: [&str; 50] = [
     "wrench_trans",
 ];
 
+/// True for the name of a function that may move the robot; `remove` does not.
+fn is_motion(name: &str) -> bool {
+    let name = name.to_ascii_lowercase().replace("remov", "");
+    let mut parts = name.split(|c: char| !c.is_ascii_alphabetic());
+    ["mov", "servo", "ptp"].iter().any(|word| name.contains(word))
+        || parts.any(|part| ["lin", "linear"].contains(&part))
+}
+
+/// True where a list of so many values that are no lists stands at a token.
+fn is_list_of(reader: &Reader<'_>, at: usize, count: usize) -> bool {
+    let Some(close) = reader.closing(at) else { return false };
+    let (mut commas, mut k) = (0, at + 1);
+    while k < close {
+        if reader.token_is_mark(k, b'[') {
+            return false;
+        }
+        commas += usize::from(reader.token_is_mark(k, b','));
+        k = if reader.token_is_mark(k, b'(') { reader.closing(k).unwrap_or(k) } else { k } + 1;
+    }
+    close > at + 1 && commas + 1 == count
+}
+
 /// A position that a call in none of the files is given, which may go there.
 struct Given {
     /// Where its numbers begin, where a variable has them.
@@ -90,19 +112,23 @@ fn call(reader: &Reader<'_>) -> Option<(String, usize)> {
     Some((name, reader.closing(reader.at + 1)?))
 }
 
-/// Words that are arguments, or elements of lists that are, of the call that ends at `close`; the reader stands on its name.
+/// Words and lists that are arguments, or elements of lists that are, of the call that ends at `close`; the reader stands on its name.
 fn arguments(reader: &Reader<'_>, close: usize) -> Vec<usize> {
     let (mut all, mut at) = (Vec::new(), reader.at + 2);
     while at < close {
         let is_word = reader.token(at).is_some_and(|t| t.kind == TokenKind::Word);
         if is_word && reader.token_is_mark(at + 1, b'(') {
             at = reader.closing(at + 1).unwrap_or(close);
-        } else if is_word {
+        } else if is_word || (reader.token_is_mark(at, b'[') && reader.token(at - 1).is_some_and(is_no_word)) {
             all.push(at);
         }
         at += 1;
     }
     all
+}
+
+fn is_no_word(token: &Token) -> bool {
+    token.kind != TokenKind::Word
 }
 
 impl Script<'_> {
@@ -157,28 +183,34 @@ impl Script<'_> {
             self.time_passes();
         }
         if self.is_unknown(&name) || self.handing_on.contains(&name) {
-            let all: Vec<Given> = arguments(&self.reader, close).into_iter().filter_map(|at| self.given(at)).collect();
+            let all: Vec<Given> =
+                arguments(&self.reader, close).into_iter().filter_map(|at| self.given(at, &name)).collect();
             all.into_iter().for_each(|given| self.goes_perhaps(&name, given));
         }
     }
 
-    /// The position that stands at a token, `p[..]` or a variable with one.
-    fn given(&self, at: usize) -> Option<Given> {
+    /// The position that stands at a token, `p[..]` or a variable with one; joint values are one where the name of the function is that of a motion.
+    fn given(&self, at: usize, function: &str) -> Option<Given> {
+        let axes = self.setting.axes.len();
+        if self.reader.token_is_mark(at, b'[') {
+            let is_position = is_motion(function) && is_list_of(&self.reader, at, axes);
+            return is_position.then_some(Given { first_byte: None });
+        }
         let name = self.reader.text(self.reader.token(at)?);
         if self.reader.token_is_mark(at + 1, b'[') {
             // `w[2]` is a number of a position.
             return (name == b"p").then_some(Given { first_byte: None });
         }
-        match self.variables.get(name).filter(|_| !self.computed.contains(name))? {
-            Value::Pose(fields, _) => {
-                let starts = fields.iter().filter_map(|field| match &field.place {
-                    FieldPlace::At(range) => Some(range.start),
-                    FieldPlace::Missing(..) => None,
-                });
-                Some(Given { first_byte: starts.min() })
-            }
-            _ => None,
-        }
+        let fields = match self.variables.get(name).filter(|_| !self.computed.contains(name))? {
+            Value::Pose(fields, _) => &fields[..],
+            Value::Joints(fields, _) if is_motion(function) && fields.len() == axes => fields,
+            _ => return None,
+        };
+        let starts = fields.iter().filter_map(|field| match &field.place {
+            FieldPlace::At(range) => Some(range.start),
+            FieldPlace::Missing(..) => None,
+        });
+        Some(Given { first_byte: starts.min() })
     }
 
     /// The robot goes there, or does not.
@@ -222,6 +254,21 @@ fn handing_on(routines: &[Routine], is_unknown: impl Fn(&str) -> bool) -> BTreeS
         }
         if all.len() == before {
             return all;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_motion;
+
+    #[test]
+    fn names_of_motions() {
+        for name in ["my_movej", "moveh", "doServo", "PTP_fast", "go_lin", "lin2", "linear_to"] {
+            assert!(is_motion(name), "{name}");
+        }
+        for name in ["remove_item", "polyline", "cooling", "set_limits"] {
+            assert!(!is_motion(name), "{name}");
         }
     }
 }
