@@ -381,11 +381,7 @@ impl<'a> Work<'a> {
                     let all: Vec<String> = all.map(|i| self.beyond(i, q[i])).collect();
                     Why::new(LeftReason::BeyondLimit, format!("it would take {}", all.join(" and ")))
                 }
-                _ => {
-                    let remain = twist_in_words(&stalled.error);
-                    let words = format!("no posture next to that of the program reaches it; {remain} remain");
-                    Why::new(LeftReason::OutOfReach, words)
-                }
+                _ => self.unreached(to.held, &stalled),
             }
         })?;
         let (i, change) = largest_change(start, &found);
@@ -396,6 +392,21 @@ impl<'a> Work<'a> {
             return Err(Why::new(LeftReason::Singular, words));
         }
         Ok(found)
+    }
+
+    /// Why nothing reaches it: within the limits, fewer than six joints cannot move the tool in all directions.
+    fn unreached(&self, held: &[bool], stalled: &Stalled) -> Why {
+        let remain = twist_in_words(&stalled.error);
+        let free = || held.iter().enumerate().filter(|(_, held)| !**held).map(|(i, _)| i);
+        let (axes, q) = (free().count(), &stalled.readings);
+        let is_within = free().all(|i| q[i] > self.limits[i].0 && q[i] < self.limits[i].1);
+        if axes < 6 && is_within {
+            let words = format!(
+                "{axes} joints that may move cannot take out all six errors of the tool: {remain} would remain (level foot and tool so that less of it is left, or teach this target on the real robot)"
+            );
+            return Why::new(LeftReason::TooFewAxes, words);
+        }
+        Why::new(LeftReason::OutOfReach, format!("no posture next to that of the program reaches it; {remain} remain"))
     }
 
     fn beyond(&self, i: usize, q: f64) -> String {

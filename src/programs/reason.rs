@@ -34,6 +34,8 @@ pub enum LeftReason {
     PostureUnknown,
     /// The model in the controller does not reach it.
     OutOfReach,
+    /// Fewer than six joints are free: the tool cannot be moved in all directions.
+    TooFewAxes,
     /// The program itself is beyond a limit.
     ProgramBeyondLimit,
     /// The correction would lead beyond a limit.
@@ -62,6 +64,7 @@ impl LeftReason {
             Self::Unvisited => "unvisited",
             Self::PostureUnknown => "posture_unknown",
             Self::OutOfReach => "out_of_reach",
+            Self::TooFewAxes => "too_few_axes",
             Self::ProgramBeyondLimit => "program_beyond_limit",
             Self::BeyondLimit => "beyond_limit",
             Self::Singular => "singular",
@@ -118,9 +121,6 @@ impl Why {
         Self::new(LeftReason::ExternalAxis, words)
     }
 
-    /// The target is not written in numbers.
-    pub(super) fn computed() -> Self {
-        Self::new(LeftReason::Computed, "its target is computed, not written in numbers")
     /// The target leaves such an axis out, which stands elsewhere than at zero, or may do so where no place is known.
     pub(super) fn external_kept(axis: &str, place: Option<f64>) -> Self {
         let stands = place.map_or("may stand elsewhere than at zero".to_owned(), |value| format!("stands at {value}"));
@@ -130,5 +130,8 @@ impl Why {
         Self::new(LeftReason::ExternalAxis, words)
     }
 
+    /// The target is not written in numbers.
+    pub(super) fn computed() -> Self {
+        Self::new(LeftReason::Computed, "its target is computed, not written in numbers")
     }
 }

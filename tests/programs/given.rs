@@ -116,6 +116,20 @@ fn rows_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_a
 }
 
 #[test]
+fn what_fewer_than_six_joints_cannot_take_out_is_no_matter_of_reach() {
+    let cell = Cell::kuka(126);
+    let names = &cell.nominal.chain.readings;
+    let file = cell.write("t.csv", format!("{}\n0.17,-1.4,1.7,0.35,0.7,0.5\n", names.join(",")).as_bytes());
+    for (held, left) in [(&names[..0], vec![]), (&names[3..5], vec![LeftReason::TooFewAxes.name().to_owned()])] {
+        let hold = format!("--hold={}", held.join(","));
+        let flags = [&["--joint-unit", "rad", "--unordered"][..], &[hold.as_str()][..held.len().min(1)]].concat();
+        let told = cell.compensate(&[&file], &flags).expect(i32::from(!held.is_empty())).told();
+        let found: Vec<String> = told.left.into_iter().map(|(.., reason)| reason).collect();
+        assert_eq!(found, left, "{hold}");
+    }
+}
+
+#[test]
 fn descriptions_that_correct_nothing_or_the_wrong_way_are_named() {
     let mut cell = Cell::kuka(123);
     let q: Vec<String> = cell.readings().iter().map(|v| format!("{v:.4}")).collect();
