@@ -1,6 +1,6 @@
 //! The circle detector on rendered pictures with known truth.
 
-use crate::circles_support::{View, behind_mosaic, errors, report, scene};
+use crate::circles_support::{View, behind_mosaic, errors, report, scene, standard_plate};
 use crate::grids::jpeg;
 use robotcal::Code;
 use robotcal::detect::Detection;
@@ -137,4 +137,27 @@ fn markers_behind_a_mosaic_of_colours_are_found_in_a_smoothed_copy() {
     report(&scene, &found, &e);
     assert_eq!((e.wrong, found.smoothed), (0, found.found.len()));
     assert!(e.found as f64 >= 0.9 * e.visible as f64 && e.rms() < 0.05, "{} of {}: {}", e.found, e.visible, e.rms());
+}
+
+/// A camera that stores the root of the light (gamma 2.2) moves the edges of small blurred rings towards each other by a third of their width:
+/// whole steps from the printed ratio of their radii overshoot. Before, no ring of the small size converged.
+#[test]
+fn small_rings_in_a_blurred_picture_with_gamma_are_measured() {
+    for (psf_sigma_px, full_well_e) in [(1.1, f64::INFINITY), (1.2, f64::INFINITY), (1.1, 20_000.0)] {
+        let mut view = View::default();
+        let smallest = standard_plate().markers.iter().map(|m| m.outer_radius_m).fold(f64::MAX, f64::min);
+        view.distance_m = view.focal_px * smallest / 8.0;
+        (view.conditions.psf_sigma_px, view.conditions.full_well_e, view.conditions.bits) =
+            (psf_sigma_px, full_well_e, 12);
+        let scene = scene(&view);
+        let mut picture = scene.render(7);
+        let full_scale = picture.full_scale;
+        picture.pixels.iter_mut().for_each(|v| *v = (full_scale * (*v / full_scale).powf(1.0 / 2.2)).round());
+        let found = detect(&picture, &scene.plate, &Options::default()).unwrap();
+        let e = errors(&scene, &found);
+        report(&scene, &found, &e);
+        assert_eq!(e.wrong, 0, "{psf_sigma_px}");
+        assert!(e.found as f64 >= 0.98 * e.visible as f64, "{psf_sigma_px}: {} of {}", e.found, e.visible);
+        assert!(e.rms() < 0.03, "{psf_sigma_px}: rms {} px", e.rms());
+    }
 }

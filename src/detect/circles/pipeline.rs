@@ -6,7 +6,7 @@ use super::candidates::candidate::{Candidate, candidates, largest_marker};
 use super::candidates::levels::Levels;
 use super::drift::Drift;
 use super::edge::model::Pixels;
-use super::edge::refine::{Fit, refine};
+use super::edge::refine::{Fit, refine_steadily};
 use super::ellipse::Ellipse;
 use super::identity::code::{MarkerCode, Verdict};
 use super::identity::lattice::{Apart, Buckets, Cell, Lattice, lattices};
@@ -307,7 +307,7 @@ impl Work<'_> {
         let camera = learn(self.picture, &mut targets, guess, levels.noise, &mut self.pixels);
         let (mut entries, mut refused) = (Vec::new(), Vec::new());
         for (&cell, target) in board.keys().zip(targets) {
-            match refine(self.picture, &target.start(&camera, 0.3), &mut self.pixels) {
+            match refine_steadily(self.picture, &target.start(&camera, 0.3), &mut self.pixels) {
                 Ok(fit) => entries.push(Entry { cell, fit, rescued: false }),
                 Err(reason) => refused.push((cell, target, reason)),
             }

@@ -2,14 +2,18 @@
 //!
 //! ```text
 //! state (the parameters) -> exact, flat_zone, nearby_ink, gauss (what makes up a pixel) -> model (pixels and derivatives)
-//!     -> squares (how well it fits) -> refine (least squares)
+//!     -> squares (how well it fits); start, prior and normal (what is known beforehand) -> descent (the steps) -> refine (least squares)
 //! ```
 
+mod descent;
 mod exact;
 mod flat_zone;
 pub(super) mod gauss;
 pub(super) mod model;
 pub(super) mod nearby_ink;
+mod normal;
+mod prior;
 pub(super) mod refine;
 mod squares;
+pub(super) mod start;
 mod state;

@@ -1,44 +1,19 @@
 //! Sub-pixel measurement of one marker: least squares of the blurred-edge model on a thin band of pixels.
 
+use super::descent::iterate;
 use super::flat_zone::{Flat, Zone};
 use super::model::{Lopsided, Pixels};
-use super::nearby_ink::{NearbyInk, lift};
+use super::nearby_ink::lift;
+use super::normal::{Normal, solve};
+use super::prior::Prior;
 use super::squares::Squares;
-use super::state::{ANNULUS, CENTRE, DARK, DISC, INNER, LN_BLUR, LN_RATIO, SHAPE, State, THIRD, WHITE};
+use super::start::{Descent, Start};
+use super::state::{ANNULUS, DARK, DISC, INNER, State};
 use crate::detect::Picture;
 use crate::detect::circles::ellipse::Ellipse;
 use crate::detect::circles::types::{Imaged, Measured, Reason};
 use crate::detect::shared::{GLARE_SLOPE, SATURATED};
 use crate::series::Edge;
-
-/// Where to start and what to assume.
-#[derive(Debug, Clone, Copy)]
-pub struct Start<'a> {
-    pub ellipse: Ellipse,
-    /// Inner over outer radius of an annulus.
-    pub ratio: Option<f64>,
-    pub paper: f64,
-    pub ink: f64,
-    pub blur_px: f64,
-    /// Prior sigma of ln blur.
-    pub blur_sigma: f64,
-    /// Prior sigma of the relative shape, where the ellipse is a prediction.
-    pub shape_sigma: Option<f64>,
-    /// Relative radius that stays clear of other markers.
-    pub clear: f64,
-    /// Variance of a pixel on paper and on ink, counts^2.
-    pub noise: [f64; 2],
-    /// Prior sigma of the ink's own gradient as a share of the contrast, 1/px.
-    pub ink_slope: f64,
-    /// Centre of the inner circle less that of the outer one, px.
-    pub apart: [f64; 2],
-    /// Third harmonic of the contours, where it is predicted.
-    pub third: Option<[f64; 2]>,
-    /// How well `apart` is known per axis, px, where geometry tells it.
-    pub tie_sigma: Option<f64>,
-    /// Measured neighbours whose ink reaches the pixels of this marker.
-    pub nearby: &'a [NearbyInk],
-}
 
 /// A fit with what the caller needs to go on.
 #[derive(Debug, Clone, Copy)]
@@ -80,14 +55,19 @@ const EVEN: f64 = 5.0;
 const SLACK: f64 = 0.5;
 /// Part of the band that must be in the picture when the shape is not known.
 pub const WHOLE: f64 = 0.98;
-/// Part of a predicted third harmonic to which it is good.
-const THIRD_PART: f64 = 0.25;
-const ITERATIONS: usize = 14;
 
 /// A gradient of the ink that exceeds its prior sigma by this factor may be that of glare, which is steep.
 const STRAINED: f64 = 5.0;
 /// Glare adds the same to ink and paper; their gradients agree to this part.
 const ADDED: f64 = 0.5;
+
+/// As [`refine`]; a fit that does not converge is begun once more with damped steps.
+pub fn refine_steadily(picture: &Picture, start: &Start, pixels: &mut Pixels) -> Result<Fit, Reason> {
+    match refine(picture, start, pixels) {
+        Err(Reason::NoConvergence) => refine(picture, &Start { descent: Descent::Damped, ..*start }, pixels),
+        other => other,
+    }
+}
 
 /// Measures one marker, once more where glare lights the ink. The work arrays `pixels` are reused from call to call.
 pub fn refine(picture: &Picture, start: &Start, pixels: &mut Pixels) -> Result<Fit, Reason> {
@@ -171,136 +151,6 @@ fn initial(start: &Start, anchor: [f64; 2]) -> State {
         dark: [start.ink, 0.0, 0.0],
         inner: start.ratio.map(|r| ([0, 1].map(|a| centre[a] + start.apart[a]), r)),
     }
-}
-
-/// Weights of what is known beforehand, and the parameters accumulated since the start.
-struct Prior {
-    weight: [f64; ANNULUS],
-    /// Weight of the distance between the centres of inner and outer circle, which only perspective separates.
-    concentric: f64,
-}
-
-impl Prior {
-    fn of(start: &Start, picture: &Picture) -> Self {
-        let mut weight = [0.0; ANNULUS];
-        let inverse = |sigma: f64| 1.0 / (sigma * sigma);
-        // The third harmonic of a distorted or foreshortened circle grows with its radius: half a radius per picture
-        // width is that of a strongly distorted wide-angle lens.
-        let third = match start.third {
-            Some([a, b]) => THIRD_PART * a.hypot(b),
-            None => 0.5 * start.ellipse.semi_axes()[0] / picture.width.max(picture.height) as f64,
-        };
-        let contrast = (start.paper - start.ink).abs().max(1.0);
-        weight[THIRD..THIRD + 2].fill(inverse(third.max(1e-4)));
-        weight[LN_BLUR] = inverse(start.blur_sigma);
-        // a black offset changes the ink's share of the gradient by a part of it
-        weight[DARK + 1..DARK + 3].fill(inverse(start.ink_slope * contrast));
-        weight[LN_RATIO] = inverse(if start.tie_sigma.is_some() { 0.02 } else { 0.05 });
-        if let Some(sigma) = start.shape_sigma {
-            weight[SHAPE..SHAPE + 3].fill(inverse(sigma));
-        }
-        let apart = start.tie_sigma.unwrap_or(0.02 + 0.012 * start.ellipse.semi_axes()[0]);
-        let concentric = if start.ratio.is_some() { inverse(apart) } else { 0.0 };
-        Self { weight, concentric }
-    }
-}
-
-impl Prior {
-    fn add_normal(&self, normal: &mut Normal) {
-        (0..ANNULUS).for_each(|i| normal[i][i] += self.weight[i]);
-        for a in 0..2 {
-            normal[CENTRE + a][CENTRE + a] += self.concentric;
-            normal[INNER + a][INNER + a] += self.concentric;
-            normal[INNER + a][CENTRE + a] -= self.concentric;
-        }
-    }
-
-    fn add_gradient(&self, travelled: &[f64; ANNULUS], gradient: &mut [f64; ANNULUS]) {
-        (0..ANNULUS).for_each(|i| gradient[i] -= self.weight[i] * travelled[i]);
-        for a in 0..2 {
-            // the start is where they are expected
-            let apart = self.concentric * (travelled[INNER + a] - travelled[CENTRE + a]);
-            gradient[INNER + a] -= apart;
-            gradient[CENTRE + a] += apart;
-        }
-    }
-}
-
-type Normal = [[f64; ANNULUS]; ANNULUS];
-
-/// Gauss-Newton steps until the centre rests; returns the factor of the last normal matrix.
-fn iterate(state: &mut State, prior: &Prior, start: &Start, pixels: &mut Pixels) -> Result<Normal, Reason> {
-    let parameters = state.parameters();
-    let mut travelled = [0.0; ANNULUS];
-    let mut factor: Normal = [[0.0; ANNULUS]; ANNULUS];
-    let mut last = f64::MAX;
-    // how far the contours have moved since the normal matrix and since the correction, px
-    let (mut since_factor, mut since_correction) = (f64::MAX, f64::MAX);
-    let size = start.ellipse.semi_axes()[0];
-    // a predicted contour is near the end from the beginning
-    let near = if start.shape_sigma.is_some() { f64::MAX } else { 0.1 };
-    for _ in 0..ITERATIONS {
-        // What the closed form misses moves with the contour: taken near the end, and again when that moved on.
-        let stale = if state.is_badly_resolved() { 0.01 } else { 0.05 };
-        if last <= near && since_correction > stale {
-            if pixels.correct(state) {
-                since_factor = f64::MAX;
-            }
-            since_correction = 0.0;
-        }
-        pixels.evaluate(state, start.noise);
-        if since_factor > 0.1 {
-            pixels.normal(parameters, &mut factor);
-            pixels.flat.add_normal(state, start.noise, &mut factor);
-            prior.add_normal(&mut factor);
-            cholesky(&mut factor, parameters).ok_or(Reason::NoConvergence)?;
-            since_factor = 0.0;
-        }
-        let mut delta = [0.0; ANNULUS];
-        pixels.gradient(parameters, &mut delta);
-        pixels.flat.add_gradient(state, start.noise, &mut delta);
-        prior.add_gradient(&travelled, &mut delta);
-        solve(&factor, parameters, &mut delta);
-        let damp = limit(&delta, size, start);
-        delta.iter_mut().for_each(|d| *d *= damp);
-        state.step(&delta);
-        (0..parameters).for_each(|i| travelled[i] += delta[i]);
-        last = magnitude(&delta, state, size);
-        if !last.is_finite() || out_of_bounds(state, &travelled, size) {
-            return Err(Reason::NoConvergence);
-        }
-        since_factor += last;
-        since_correction += last;
-        if last < 1e-3 && since_correction < 0.1 {
-            return Ok(factor);
-        }
-    }
-    if last < 5e-3 { Ok(factor) } else { Err(Reason::NoConvergence) }
-}
-
-/// Shortens a step that leaves the range where the model is nearly linear.
-fn limit(delta: &[f64; ANNULUS], size: f64, start: &Start) -> f64 {
-    let contrast = (start.paper - start.ink).abs().max(1e-6);
-    let centre = delta[0].hypot(delta[1]) / (0.5 * start.blur_px + 0.05 * size);
-    let shape = delta[SHAPE..SHAPE + 3].iter().fold(0.0f64, |m, v| m.max(v.abs())) / 0.15;
-    let blur = delta[LN_BLUR].abs() / 0.4;
-    let level = delta[WHITE].abs().max(delta[DARK].abs()) / contrast;
-    1.0 / centre.max(shape).max(blur).max(level).max(1.0)
-}
-
-/// Size of a step as a displacement of the contours, px.
-fn magnitude(delta: &[f64; ANNULUS], state: &State, size: f64) -> f64 {
-    let shape = delta[SHAPE..THIRD + 2].iter().map(|v| v.abs()).sum::<f64>() * 0.1 * size;
-    let inner = if state.inner.is_some() { delta[INNER].abs() + delta[INNER + 1].abs() } else { 0.0 };
-    delta[0].abs() + delta[1].abs() + inner + shape.min(1.0) + 0.02 * delta[LN_BLUR].abs()
-}
-
-fn out_of_bounds(state: &State, travelled: &[f64; ANNULUS], size: f64) -> bool {
-    let far = travelled[0].hypot(travelled[1]) > 1.0 + 0.25 * size;
-    let inner = state.inner.is_some_and(|(c, k)| {
-        !(0.1..0.95).contains(&k) || (c[0] - state.centre[0]).hypot(c[1] - state.centre[1]) > 0.5 + 0.25 * size
-    });
-    far || inner || !(0.2..8.0).contains(&state.blur)
 }
 
 fn finish(
@@ -554,42 +404,5 @@ impl Strip<'_> {
             Use::Ink => self.pixels.flat.ink.push_row(x, y, values),
             Use::Nothing => {}
         }
-    }
-}
-
-/// Cholesky factor in place: from the lower triangle to the upper triangular `U` of `U' U`.
-fn cholesky(m: &mut Normal, n: usize) -> Option<()> {
-    for i in 0..n {
-        let (above, below) = m.split_at_mut(i);
-        above.iter_mut().zip(&below[0]).for_each(|(row, v)| row[i] = *v);
-    }
-    let diagonal: [f64; ANNULUS] = std::array::from_fn(|i| m[i][i]);
-    for j in 0..n {
-        let (done, below) = m.split_at_mut(j + 1);
-        let row = &mut done[j];
-        let pivot = row[j];
-        if pivot.is_nan() || pivot <= 1e-12 * diagonal[j].abs() {
-            return None;
-        }
-        let inverse = 1.0 / pivot.sqrt();
-        row[j..n].iter_mut().for_each(|v| *v *= inverse);
-        for (i, other) in (j + 1..n).zip(below) {
-            let factor = row[i];
-            other[i..n].iter_mut().zip(&row[i..n]).for_each(|(v, u)| *v -= factor * u);
-        }
-    }
-    Some(())
-}
-
-/// Solves in place with a factor of [`cholesky`].
-fn solve(u: &Normal, n: usize, b: &mut [f64; ANNULUS]) {
-    for i in 0..n {
-        let v = b[i] / u[i][i];
-        b[i] = v;
-        b[i + 1..n].iter_mut().zip(&u[i][i + 1..n]).for_each(|(b, u)| *b -= v * u);
-    }
-    for i in (0..n).rev() {
-        let known: f64 = u[i][i + 1..n].iter().zip(&b[i + 1..n]).map(|(u, b)| u * b).sum();
-        b[i] = (b[i] - known) / u[i][i];
     }
 }

@@ -4,7 +4,8 @@ use crate::detect::Picture;
 use crate::detect::circles::candidates::candidate::{Candidate, candidates, largest_marker};
 use crate::detect::circles::candidates::levels::Levels;
 use crate::detect::circles::edge::model::Pixels;
-use crate::detect::circles::edge::refine::{Fit, Start, refine};
+use crate::detect::circles::edge::refine::{Fit, refine, refine_steadily};
+use crate::detect::circles::edge::start::{Descent, Start};
 use crate::detect::circles::ellipse::Ellipse;
 use crate::detect::circles::identity::lattice::Buckets;
 use crate::detect::circles::types::{DroppedCandidate, Measured, Options, Reason};
@@ -56,6 +57,7 @@ impl Target {
             third: None,
             tie_sigma: None,
             nearby: &[],
+            descent: Descent::Whole,
         }
     }
 }
@@ -71,9 +73,14 @@ pub fn learn(picture: &Picture, targets: &mut [Target], guess_blur: f64, noise: 
     for _ in 0..2 {
         camera.ink_slope = INK_SLOPE;
         let stride = targets.len().div_ceil(LEARNERS).max(1);
-        let learners = targets.iter().step_by(stride);
-        let (started, fits): (Vec<&Target>, Vec<Fit>) =
-            learners.filter_map(|t| Some((t, refine(picture, &t.start(&camera, 0.7), pixels).ok()?))).unzip();
+        let mut look = |fit: fn(&Picture, &Start, &mut Pixels) -> Result<Fit, Reason>| -> (Vec<&Target>, Vec<Fit>) {
+            let learners = targets.iter().step_by(stride);
+            learners.filter_map(|t| Some((t, fit(picture, &t.start(&camera, 0.7), pixels).ok()?))).unzip()
+        };
+        let (mut started, mut fits) = look(refine);
+        if fits.is_empty() {
+            (started, fits) = look(refine_steadily);
+        }
         let size = |e: &Ellipse| e.semi_axes().iter().sum::<f64>() / 2.0;
         let beside = started.iter().zip(&fits).map(|(t, f)| size(&f.measured.outer.ellipse) - size(&t.ellipse));
         let (Some(beside), Some(blur)) = (median(beside), median(fits.iter().map(|f| f.measured.blur_px))) else {
@@ -128,7 +135,7 @@ pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Drop
     let camera = learn(picture, &mut targets, guess, levels.noise, &mut pixels);
     let mut measured = Vec::new();
     for target in &targets {
-        match refine(picture, &target.start(&camera, 0.3), &mut pixels) {
+        match refine_steadily(picture, &target.start(&camera, 0.3), &mut pixels) {
             Ok(fit) => measured.push(fit.measured),
             Err(reason) => dropped.push(drop_target(target, reason, None)),
         }
