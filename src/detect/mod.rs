@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! pictures (files to grey values) -> run (a series: image after image) -> circles, boards or tags (one folder a family of plates;
-//!         corners: where edges cross, to parts of a pixel) -> detection -> size_seen, other_kind, dot_sizes (is it another plate)
+//!         corners: where edges cross, to parts of a pixel) -> detection -> grey_levels (what rounding adds), size_seen, other_kind, dot_sizes (is it another plate)
 //! ```
 //!
 //! A new kind of plate is one file that maps a [`Picture`] and a [`Plate`] to a [`Detection`], and one row in `by_kind`.
@@ -12,6 +12,7 @@ pub mod circles;
 mod corners;
 mod detection;
 mod dot_sizes;
+mod grey_levels;
 mod other_kind;
 mod pictures;
 mod run;
@@ -30,6 +31,7 @@ pub use run::{SeriesImage, detect_series};
 
 use crate::error::{Code, Error, Result};
 use crate::series::{Plate, PlateKind};
+use grey_levels::{allow_for_rounding, few_levels};
 
 /// Finds and identifies the markers of a plate in a picture.
 ///
@@ -49,7 +51,12 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
 
 /// As [`detect`], but a picture in which nothing can be identified still says what was seen: see [`Detection::failure`].
 pub fn examine(picture: &Picture, plate: &Plate) -> Detection {
-    by_kind(picture, plate).unwrap_or_else(|error| Detection { failure: Some(error), ..Detection::default() })
+    let mut detection =
+        by_kind(picture, plate).unwrap_or_else(|error| Detection { failure: Some(error), ..Detection::default() });
+    if let Some(levels) = few_levels(picture) {
+        allow_for_rounding(&mut detection, levels);
+    }
+    detection
 }
 
 fn by_kind(picture: &Picture, plate: &Plate) -> Result<Detection> {

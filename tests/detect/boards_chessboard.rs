@@ -105,6 +105,28 @@ fn over_exposed_squares_do_not_move_corners() {
     assert!(rms(&errors) < 0.006, "{}", rms(&errors));
 }
 
+/// In black and white alone edges jump from pixel to pixel: the fit sees a sharp picture and states a third of the errors.
+#[test]
+fn corners_of_one_bit_are_as_uncertain_as_their_rounding() {
+    let (mut sum, mut count) = (0.0, 0);
+    for step in 0..6 {
+        let scene = tilted(9, 6, 0.4 + f64::from(step));
+        let mut picture = scene.render(0);
+        picture.pixels.iter_mut().for_each(|v| *v = if *v < 110.0 { 0.0 } else { 255.0 });
+        let detection = detect(&picture, &plate(9, 6)).unwrap();
+        assert!(detection.observations.len() >= 50, "step {step}: {:?}", detection.dropped);
+        assert!(detection.notices.iter().any(|n| n.code == Code::FewGreyLevels), "{:?}", detection.notices);
+        for (o, e) in detection.observations.iter().zip(errors(&detection, |id| scene.corner(id))) {
+            // Eight pixels of an edge, uniform in each: 0.10 px.
+            let [uu, _, vv] = o.covariance.unwrap();
+            assert!(uu > 0.0104 && vv > 0.0104, "{uu} {vv}");
+            sum += e[0] * e[0] / uu + e[1] * e[1] / vv;
+            count += 2;
+        }
+    }
+    assert!(sum / f64::from(count) < 1.0, "{sum} over {count}");
+}
+
 #[test]
 fn sixteen_bits_are_used_in_full() {
     // The whole contrast is 25 of 65535 counts of 16 bit above a tenth of full scale; in 8 bits it would be gone.

@@ -156,7 +156,7 @@ pub struct Measured {
 
 impl Measured {
     /// Its centres with covariances that are so many times as large, and a systematic error, px per axis, beside.
-    pub(super) fn widen(&mut self, factor: f64, systematic_px: f64) {
+    pub(in crate::detect) fn widen(&mut self, factor: f64, systematic_px: f64) {
         for imaged in std::iter::once(&mut self.outer).chain(&mut self.inner) {
             let [uu, uv, vv] = imaged.covariance.map(|c| c * factor);
             let floor = systematic_px * systematic_px;

@@ -101,6 +101,7 @@ fn is_information(code: Code) -> bool {
     matches!(
         code,
         Code::DictionaryGuessed
+            | Code::FewGreyLevels
             | Code::ImageDelayFound
             | Code::ImageDelayUnchecked
             | Code::ImageNotThere
