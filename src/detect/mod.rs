@@ -32,6 +32,7 @@ pub use run::{SeriesImage, detect_series};
 use crate::error::{Code, Error, Result};
 use crate::series::{Plate, PlateKind};
 use grey_levels::{allow_for_rounding, few_levels};
+use pictures::hot_pixels::{hot_pixels, without_hot_pixels};
 
 /// Finds and identifies the markers of a plate in a picture.
 ///
@@ -51,11 +52,14 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
 
 /// As [`detect`], but a picture in which nothing can be identified still says what was seen: see [`Detection::failure`].
 pub fn examine(picture: &Picture, plate: &Plate) -> Detection {
+    let mended = without_hot_pixels(picture);
+    let looked_at = mended.as_ref().map_or(picture, |(mended, _)| mended);
     let mut detection =
-        by_kind(picture, plate).unwrap_or_else(|error| Detection { failure: Some(error), ..Detection::default() });
+        by_kind(looked_at, plate).unwrap_or_else(|error| Detection { failure: Some(error), ..Detection::default() });
     if let Some(levels) = few_levels(picture) {
         allow_for_rounding(&mut detection, levels);
     }
+    detection.notices.extend(mended.map(|(_, count)| hot_pixels(count)));
     detection
 }
 

@@ -203,6 +203,7 @@ codes! {
         ImageSizeImpossible "image_size_impossible" "an image is too small to show anything, or larger than is read or drawn",
         ImageSizeDiffers "image_size_differs" "an image has another size or depth than the others",
         ImageDepth "image_depth" "pixels do not fit the stated number of bits",
+        HotPixels "hot_pixels" "single pixels of an image that are far from all their neighbours were replaced",
         FewGreyLevels "few_grey_levels" "an image has so few grey levels that its edges jump from pixel to pixel",
         MarkersBright "markers_bright" "the markers are brighter than the ground and measured in the negative",
         ImagePages "image_pages" "an image file holds several pages, of which one is taken",

@@ -127,6 +127,18 @@ fn corners_of_one_bit_are_as_uncertain_as_their_rounding() {
     assert!(sum / f64::from(count) < 1.0, "{sum} over {count}");
 }
 
+/// One pixel in a thousand at full scale.
+#[test]
+fn hot_pixels_cost_no_corner_and_are_said() {
+    let scene = tilted(9, 6, 0.3);
+    let mut picture = scene.render(0);
+    picture.pixels.iter_mut().step_by(1009).for_each(|v| *v = 255.0);
+    let detection = detect(&picture, &plate(9, 6)).unwrap();
+    assert_eq!(detection.observations.len(), 54, "{:?}", detection.dropped);
+    assert!(matches!(&detection.notices[..], [n] if n.code == Code::HotPixels), "{:?}", detection.notices);
+    assert!(rms(&errors(&detection, |id| scene.corner(id))) < 0.02);
+}
+
 #[test]
 fn sixteen_bits_are_used_in_full() {
     // The whole contrast is 25 of 65535 counts of 16 bit above a tenth of full scale; in 8 bits it would be gone.

@@ -293,6 +293,24 @@ fn tags_that_a_mosaic_or_noise_hides_are_found_in_a_smoothed_copy() {
     }
 }
 
+/// One pixel in a thousand at full scale.
+#[test]
+fn hot_pixels_cost_no_tag() {
+    let look = View { distance_m: 0.6, tilt_deg: 20.0, roll_deg: 30.0, ..View::default() };
+    for (text, corners) in [(APRILGRID, 144), (ARUCO, 140)] {
+        let scene = Scene { plate: plate(text), camera_from_plate: pose(&look), ..scene(&look) };
+        let mut picture = scene.render(1);
+        let full_scale = picture.full_scale;
+        picture.pixels.iter_mut().step_by(1009).for_each(|v| *v = full_scale);
+        let found = detect(&picture, &scene.plate).unwrap_or_else(|e| panic!("{text}: {e}"));
+        let (normalised, farthest) = accuracy(&scene, &found);
+        println!("{} corners, normalised {normalised:.2}, farthest {farthest:.3} px", found.observations.len());
+        assert!(found.observations.len() as f64 >= 0.97 * f64::from(corners), "{text}");
+        assert!(normalised < 1.5 && farthest < 0.6, "{text}: {normalised} {farthest}");
+        assert!(found.notices.iter().any(|n| n.code == Code::HotPixels), "{text}");
+    }
+}
+
 /// A border of one module, blurred by a quarter to half a module: the light of the code shines through it.
 #[test]
 fn blurred_tags_with_a_narrow_border_are_as_uncertain_as_stated() {

@@ -1,7 +1,8 @@
-//! Pictures: files to grey values, the flat field of a camera, and pictures in 8 bits for finding corners.
+//! Pictures: files to grey values, the flat field of a camera, pictures in 8 bits for finding corners, and pixels that tell nothing.
 
 pub(super) mod bytes;
 pub(super) mod flat_field;
 pub(super) mod flat_field_facts;
+pub(super) mod hot_pixels;
 pub(super) mod load;
 pub(super) mod picture;

@@ -102,6 +102,7 @@ fn is_information(code: Code) -> bool {
         code,
         Code::DictionaryGuessed
             | Code::FewGreyLevels
+            | Code::HotPixels
             | Code::ImageDelayFound
             | Code::ImageDelayUnchecked
             | Code::ImageNotThere
