@@ -61,6 +61,8 @@ pub(super) fn iterate(state: &mut State, prior: &Prior, start: &Start, pixels: &
         solve(&factor, parameters, &mut delta);
         let damp = limit(&delta, size, start);
         delta.iter_mut().for_each(|d| *d *= damp);
+        // no more than the state takes: what is travelled counts against what is known
+        delta[LN_RATIO] = delta[LN_RATIO].clamp(-LONGEST_LN_RATIO, LONGEST_LN_RATIO);
         state.step(&delta);
         (0..parameters).for_each(|i| travelled[i] += delta[i]);
         last = magnitude(&delta, state, size);
