@@ -56,6 +56,11 @@ const FARTHEST_PX: f64 = 3.0;
 /// Residuals above this share of the contrast are another structure.
 const WORST: f64 = 0.12;
 
+/// Prior sigma of the curvature of a side, 1/px.
+pub(super) fn bend(picture: &Picture) -> f64 {
+    BEND / picture.width.max(picture.height) as f64
+}
+
 /// Where a side is looked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Side {
@@ -108,6 +113,8 @@ pub type Measured = Result<EdgeLine, &'static str>;
 #[derive(Debug, Clone, Copy)]
 struct Fit {
     covariance: SMatrix<f64, 3, 3>,
+    /// Variance of a displacement towards the light that the sides of a tag have in common, px^2.
+    common: f64,
     /// Root mean square of the residuals on the paper, the step to it from the ink, and the ink, counts.
     paper_residual: f64,
     contrast: f64,
@@ -143,6 +150,7 @@ impl EdgeLine {
             shape: Vector3::zeros(),
             fit: Fit {
                 covariance: SMatrix::zeros(),
+                common: 0.0,
                 paper_residual: 0.0,
                 contrast: 0.0,
                 dark: 0.0,
@@ -255,9 +263,15 @@ impl EdgeLine {
         d.dot(&self.across) - self.offset(d.dot(&self.along))
     }
 
-    /// The side when its ink ends so many px earlier.
-    pub fn shrunk(mut self, by_px: f64) -> Self {
+    /// How far its middle lies towards the light of where it was looked for, px, and the variance of that.
+    pub fn offset_at_middle(&self) -> (f64, f64) {
+        (self.shape[0], self.fit.covariance[(0, 0)])
+    }
+
+    /// The side when its ink ends so many px earlier, a number with this variance that the sides of a tag have in common, px^2.
+    pub fn shrunk(mut self, by_px: f64, variance: f64) -> Self {
         self.shape[0] -= by_px;
+        self.fit.common = variance;
         self
     }
 
@@ -280,7 +294,9 @@ impl EdgeLine {
             p -= slopes.try_inverse()? * left;
         }
         let inverse = slopes.try_inverse()?;
-        let covariance = inverse * Matrix2::from_diagonal(&Vector2::from(variance)) * inverse.transpose();
+        let common = Matrix2::repeat(0.5 * (self.fit.common + other.fit.common));
+        let of_sides = Matrix2::from_diagonal(&Vector2::from(variance)) + common;
+        let covariance = inverse * of_sides * inverse.transpose();
         let floor = SYSTEMATIC_PX * SYSTEMATIC_PX;
         let all = [covariance[(0, 0)] + floor, covariance[(0, 1)], covariance[(1, 1)] + floor];
         (p.iter().chain(&all).all(|v| v.is_finite())).then(|| (p.into(), all))
@@ -302,12 +318,11 @@ fn start(pixels: &[Pixel], state: &mut Column) -> Result<(), &'static str> {
 /// Gauss-Newton steps to the end.
 fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column) -> Result<Fit, &'static str> {
     let mut noise = 0.03 * state[4];
-    let bend = BEND / picture.width.max(picture.height) as f64;
     let farthest = (FARTHEST * length).max(FARTHEST_PX);
     let first = *state;
     let (level, slope) = (LEVEL * first[4], SLOPE_PER_PX * first[4]);
     let priors = [
-        (2, 0.0, bend),
+        (2, 0.0, bend(picture)),
         (3, USUAL_BLUR_PX.ln(), BLUR_SIGMA),
         (4, first[4], level),
         (5, 0.0, slope),
@@ -344,7 +359,8 @@ fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column)
         if step[0].abs() + step[1].abs() * length / 2.0 < rest {
             let (contrast, paper_residual) = (state[4], (paper.0 / paper.1.max(1.0)).sqrt());
             let covariance = factor.inverse().fixed_view::<3, 3>(0, 0).into_owned();
-            let fit = Fit { covariance, paper_residual, contrast, dark: state[6], blur_px: blur, is_lit: false };
+            let fit =
+                Fit { covariance, common: 0.0, paper_residual, contrast, dark: state[6], blur_px: blur, is_lit: false };
             return if noise < WORST * contrast { Ok(fit) } else { Err("disturbed surroundings") };
         }
     }

@@ -8,12 +8,15 @@
 //!
 //! ```text
 //! quads (quadrilaterals) -> code, scan (what is written in them) -> layout (do the neighbours agree)
-//!         -> edge_line, beside, misfit (sides, and what disturbs them) -> pipeline (the stages in their order) -> seen (what stands there instead)
+//!         -> edge_line, beside, misfit (sides, and what disturbs them) -> code_edges, growth (how far ink reaches beyond its place)
+//!         -> pipeline (the stages in their order) -> seen (what stands there instead)
 //! ```
 
 mod beside;
 pub(super) mod code;
+mod code_edges;
 mod edge_line;
+mod growth;
 pub(super) mod layout;
 mod misfit;
 mod pipeline;

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::beside::Printed;
 use super::code::{Reader, SURE_BITS};
 use super::edge_line::{EdgeLine, Measured, Side};
+use super::growth::{self, Growth, InPicture, Outlined};
 use super::layout::{Layout, Tagged};
 use super::misfit::Usual;
 use super::quads::{Quad, distance, middle};
@@ -26,6 +27,8 @@ const FEW: usize = 4;
 const LEAST_TWICE: usize = 2;
 /// Sides that must say by how much ink has grown before they are believed.
 const LEAST_GROWN: usize = 8;
+/// Sigma of a normal distribution over its median distance from the middle.
+const NORMAL_MEDIAN: f64 = 1.4826;
 /// Tags that say where another one stands.
 const NEAREST: usize = 6;
 /// How far a tag may be from where the others say, in sides of it: one neighbour extrapolates roughly.
@@ -100,14 +103,14 @@ impl<'a> Board<'a> {
             return if is_twice { Err(all_twice(&twice)) } else { Ok(None) };
         }
         self.complete(&mut found);
-        self.measure(&found, &mut detection);
+        let off_px = self.measure(&found, &mut detection);
         detection.outline = self.outline(&found);
         detection.notices.extend(is_twice.then(|| some_twice(&twice)));
         if self.smoothing_px > 0.0 {
             detection.notices.push(smoothed_notice(found.len(), found.len()));
         }
         let measured = Layout::of(&whole(&detection.observations));
-        match gap_contradiction(self.tags, &measured, &MEASURED) {
+        match gap_contradiction(self.tags, &measured, &MEASURED.less(off_px)) {
             Some(error) => Err(error),
             None => Ok(Some(detection)),
         }
@@ -209,14 +212,24 @@ impl<'a> Board<'a> {
         }
     }
 
-    fn measure(&self, found: &Found, detection: &mut Detection) {
+    /// Measures the corners; how far the sides may be off in common, px.
+    fn measure(&self, found: &Found, detection: &mut Detection) -> f64 {
         let sides: Sides = found.iter().map(|(place, corners)| (*place, self.sides(*place, corners))).collect();
-        let (grown_px, usual) = (self.grown(found, &sides), Usual::of(sides.values().flatten().flatten()));
-        for (place, four) in sides {
-            let id = self.number(place);
-            let [bottom, right, top, left] = usual.undisturbed(four).map(|side| Ok(side?.shrunk(grown_px)));
+        let usual = Usual::of(sides.values().flatten().flatten());
+        let sides: Sides = sides.into_iter().map(|(place, four)| (place, usual.undisturbed(four))).collect();
+        let own = self.grown(found, &sides);
+        let known = InPicture::of(&own.values().copied().collect::<Vec<_>>());
+        let of_place = |place: &usize| match known.map(|known| known.with(own.get(place).copied())) {
+            None => Growth { px: 0.0, variance: 0.0 },
+            Some(growth) if self.tags.print == TagPrint::Kalibr => growth,
+            Some(growth) => growth.of_outline(),
+        };
+        for (place, four) in &sides {
+            let id = self.number(*place);
+            let growth = of_place(place);
+            let [bottom, right, top, left] = four.map(|side| Ok(side?.shrunk(growth.px, growth.variance)));
             let crossings = [(left, bottom), (bottom, right), (right, top), (top, left)];
-            for ((k, (a, b)), start) in (0..).zip(crossings).zip(found[&place]) {
+            for ((k, (a, b)), start) in (0..).zip(crossings).zip(found[place]) {
                 match crossing(a, b, start) {
                     Ok((uv, covariance)) => {
                         let (marker, covariance) = (4 * id + k, Some(covariance));
@@ -227,6 +240,9 @@ impl<'a> Board<'a> {
             }
         }
         detection.observations.sort_by_key(|o| o.marker);
+        // An encoding displaces an edge by less than its blur.
+        let blur = || median(sides.values().flatten().flatten().map(EdgeLine::blur_px));
+        if known.is_some() { 0.0 } else { blur().unwrap_or(0.0) }
     }
 
     /// Whether each outer line of tags shows one, or should be in view.
@@ -284,15 +300,29 @@ impl<'a> Board<'a> {
         if self.tags.gap_m > 0.0 { self.tags.gap_m / self.tags.side_m * self.reader.side() as f64 } else { 1.0 }
     }
 
-    /// How far ink reaches beyond its place, px: where a side of a tag of an AprilGrid ends, the side of a dark square goes on with its
-    /// ink on the other side, so that printing and clipping move the two apart by twice that.
-    fn grown(&self, found: &Found, sides: &Sides) -> f64 {
-        if self.tags.print != TagPrint::Kalibr {
-            return 0.0;
+    /// How far ink reaches beyond its place, of the tags that say it.
+    fn grown(&self, found: &Found, sides: &Sides) -> BTreeMap<usize, Growth> {
+        if self.tags.print == TagPrint::Kalibr {
+            return self.grown_beside_squares(found, sides);
         }
+        let of_code = |(place, four): (&usize, &[Measured; 4])| {
+            let corner = |k: usize| crossing(four[(k + 3) % 4], four[k], found[place][k]).ok();
+            let corners = [corner(0)?, corner(1)?, corner(2)?, corner(3)?];
+            let contrast = median(four.iter().flatten().map(EdgeLine::contrast))?;
+            let variance = corners.iter().map(|(_, c)| c[0] + c[2]).sum::<f64>() / 8.0;
+            let printed = self.print_of(*place);
+            let tag = Outlined { printed: &printed, corners: corners.map(|(uv, _)| uv), variance, contrast };
+            Some((*place, tag.growth(self.picture, self.smoothing_px)?))
+        };
+        sides.iter().filter_map(of_code).collect()
+    }
+
+    /// Where a side of a tag of an AprilGrid ends, the side of a dark square goes on with its ink on the other side, so that what moves both
+    /// moves them apart by twice that.
+    fn grown_beside_squares(&self, found: &Found, sides: &Sides) -> BTreeMap<usize, Growth> {
         let share = self.tags.gap_m / self.tags.side_m;
-        let mut grown: Vec<f64> = Vec::new();
-        for (place, four) in sides {
+        let beside = |(place, four): (&usize, &[Measured; 4])| {
+            let mut grown: Vec<f64> = Vec::new();
             let corners = found[place];
             for (k, side) in four.iter().enumerate().filter_map(|(k, side)| Some((k, side.as_ref().ok()?))) {
                 let px = 0.5 * share * width(&corners, k);
@@ -304,8 +334,15 @@ impl<'a> Board<'a> {
                     grown.extend(square.map(|square| -0.5 * side.step_to(&square)));
                 }
             }
+            (*place, grown)
+        };
+        let said: BTreeMap<usize, Vec<f64>> = sides.iter().map(beside).collect();
+        if said.values().map(Vec::len).sum::<usize>() < LEAST_GROWN {
+            return BTreeMap::new();
         }
-        median(&grown).filter(|_| grown.len() >= LEAST_GROWN).unwrap_or(0.0)
+        let variance = scatter(&said);
+        let of_tag = |(place, values): (usize, Vec<f64>)| Some((place, growth::of_tag(&values, variance)?));
+        said.into_iter().filter_map(of_tag).collect()
     }
 
     /// What is in the picture, where the plate is not.
@@ -317,6 +354,15 @@ impl<'a> Board<'a> {
         }
         instead(self.picture, self.plate, self.tags, &quads).unwrap_or_else(|| nothing(self.tags))
     }
+}
+
+/// Variance of a value about the median of its tag, from the median of their distances.
+fn scatter(said: &BTreeMap<usize, Vec<f64>>) -> f64 {
+    let apart = said.values().flat_map(|values| {
+        let middle = median(values).unwrap_or(0.0);
+        values.iter().map(move |v| (v - middle).abs())
+    });
+    (NORMAL_MEDIAN * median(apart.collect::<Vec<_>>()).unwrap_or(0.0)).powi(2)
 }
 
 /// The tags all of whose corners are measured.

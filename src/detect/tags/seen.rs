@@ -20,9 +20,16 @@ pub struct Known {
     decimals: usize,
 }
 
+impl Known {
+    /// Where the ends of a gap may be off by so many px each.
+    pub(super) fn less(self, by_px: f64) -> Self {
+        Self { px: self.px + 2.0 * by_px, ..self }
+    }
+}
+
 /// From contours, which lie nearer to the ink where edges are blurred.
 const BY_CONTOURS: Known = Known { share: 0.1, px: 2.0, decimals: 1 };
-/// From measured sides: ink grows in print, and paper that is clipped grows into it.
+/// From measured sides, what ink has grown being taken off.
 pub(super) const MEASURED: Known = Known { share: 0.02, px: 1.0, decimals: 2 };
 /// Bits beyond chance of a tag that is named: of the stated dictionary, and of one of many.
 const STATED_BITS: f64 = 8.0;
