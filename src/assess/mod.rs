@@ -50,7 +50,7 @@ pub use points::{ExpectedRms, MeasuredPoint, PointFit, fit_points};
 pub use points_apart::{DeviceMoved, OddPoints, StepCause, device_moved, odd_points};
 pub use points_mistaken::{ReadingMistake, reading_mistake};
 pub use projection::ProjectionMap;
-pub use promise::{FlangeErrors, FlangeIntervals, StopNoise, scatter_m, usual_joint_sigma};
+pub use promise::{FlangeErrors, FlangeIntervals, NoiseAtStop, by_readings, scatter_m, usual_joint_sigma};
 pub use propagate::{PredictedPose, View, predict_pose};
 pub use repeating::stops_for_one;
 pub use statistics::{Ratio, best_run, bootstrap_ratio, by_cluster, log_chance, most_of_sum, root_mean_square};

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::WorkspacePoint;
 use super::flange::{FlangeModel, everywhere};
 use super::limits::Limits;
-use super::promise::{FlangeErrors, StopNoise, nominal_laid_over, usual_joint_sigma};
+use super::promise::{FlangeErrors, NoiseAtStop, nominal_laid_over, usual_joint_sigma};
 use super::repeating::Repeats;
 use super::used_stops::{on_robot_sigmas, stops};
 use crate::geom::adjoint;
@@ -41,7 +41,7 @@ pub fn restraint(fit: &Fit, limits: &Limits) -> Option<Restraint> {
     let (robot, layout, stops) = (&fit.state.robot, &fit.problem.layout, stops(&fit.problem));
     let model = FlangeModel::of(fit, &fit.covariance.reduced, limits)?;
     let joint_sigma = &usual_joint_sigma(&on_robot_sigmas(&fit.problem));
-    let flange = FlangeErrors::new(&model, (robot, None), StopNoise { joint_sigma, told: None }, &stops)?;
+    let flange = FlangeErrors::new(&model, (robot, None), NoiseAtStop { joint_sigma, told: None }, &stops)?;
     extrapolation_m(&model.workspace(), flange.nominal_m, limits)?;
     let exported = robot.without_local_errors();
     let displacement_m = nominal_laid_over(&exported, &stops)?.rms_m;

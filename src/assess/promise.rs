@@ -64,7 +64,7 @@ impl FlangeErrors {
     pub fn new(
         model: &FlangeModel,
         (robot, alone): (&Robot, Option<&Robot>),
-        noise: StopNoise<'_>,
+        noise: NoiseAtStop<'_>,
         stops: &[Posture],
     ) -> Option<Self> {
         let samples = model.region();
@@ -125,7 +125,7 @@ fn rms(displacements: &[Vector3<f64>]) -> f64 {
 }
 
 /// Mean square over samples by which a reading of each joint moves the position of the flange, m^2 for 1 rad or m.
-fn by_readings(robot: &Robot, samples: &[Posture]) -> Vec<f64> {
+pub fn by_readings(robot: &Robot, samples: &[Posture]) -> Vec<f64> {
     let mut squares = vec![0.0; robot.chain.readings.len()];
     for sample in samples {
         let moved = robot.kinematics(sample, &vec![0.0; sample.readings.len()]).d_readings;
@@ -136,19 +136,19 @@ fn by_readings(robot: &Robot, samples: &[Posture]) -> Vec<f64> {
 
 /// What the noise of a stop does to the position of the flange, RMS over postures, m.
 pub fn scatter_m(robot: &Robot, joint_sigma: &[f64], postures: &[Posture]) -> f64 {
-    StopNoise { joint_sigma, told: None }.scatter(&by_readings(robot, postures)).variance.sqrt()
+    NoiseAtStop { joint_sigma, told: None }.scatter(&by_readings(robot, postures)).variance.sqrt()
 }
 
 /// Joint noise of a stop.
 #[derive(Clone, Copy)]
-pub struct StopNoise<'a> {
+pub struct NoiseAtStop<'a> {
     /// Per reading, rad or m.
     pub joint_sigma: &'a [f64],
     /// How well the data tell it, with the share of the stops that every series has; none where it counts as known.
     pub told: Option<(&'a NoiseInformation, &'a [f64])>,
 }
 
-impl StopNoise<'_> {
+impl NoiseAtStop<'_> {
     /// Of a sum of the variances with these weights. What counts as none stays none.
     fn scatter(&self, weights: &[f64]) -> Spread {
         let all = weights.iter().zip(self.joint_sigma);

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::used_stops::{on_robot_sigmas, shares_of_series, stops};
 use crate::assess::{
-    FlangeErrors, FlangeModel, Identifiability, Limits, StopNoise, WorkspacePoint, clustered_covariance,
+    FlangeErrors, FlangeModel, Identifiability, Limits, NoiseAtStop, WorkspacePoint, clustered_covariance,
     identifiability, urdf_alone, usual_joint_sigma,
 };
 use crate::model::robot::Robot;
@@ -89,7 +89,7 @@ pub fn judge(
     let shares = shares_of_series(problem);
     // Beside images the joint noise is known well.
     let told = found.noise_information.as_ref().filter(|_| problem.used_on_robot().next().is_none());
-    let noise = StopNoise { joint_sigma, told: told.map(|told| (told, &shares[..])) };
+    let noise = NoiseAtStop { joint_sigma, told: told.map(|told| (told, &shares[..])) };
     found.alone = model.as_ref().and_then(|m| urdf_alone(&state.robot, &problem.layout, &m.region()));
     let robots = (&state.robot, found.alone.as_ref());
     let promise = |m: &FlangeModel| FlangeErrors::new(m, robots, noise, &stops);

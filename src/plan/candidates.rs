@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use nalgebra::Vector3;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -261,8 +260,9 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
         return Error::new(Code::PlanViewless, "plan: views", what, remedy);
     }
     let arm = setting.robot.chain.arm_length_m();
-    let foot = setting.robot.chain.base_from_foot().unwrap_or_else(Pose::identity).translation;
-    let stands = if foot == Vector3::zeros() { "base" } else { "foot of the robot" };
+    let foot = setting.robot.chain.base_from_foot();
+    let stands = if foot.is_none() { "base" } else { "foot of the robot" };
+    let foot = foot.unwrap_or_else(Pose::identity).translation;
     let axes = setting.robot.chain.readings.len();
     if tally.out_of_reach + tally.unseen == tally.views && axes < 6 {
         let what =

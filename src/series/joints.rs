@@ -182,7 +182,11 @@ impl Columns {
         let written = |c: usize| table.rows().map(move |row| row.cell(c)).filter(|cell| !cell.is_empty());
         let is_text = |c: &&usize| written(**c).nth(1).is_some() && !written(**c).any(is_number);
         match self.joints.iter().find(is_text) {
-            Some(&text) if table.rows().any(|row| table.without_sign(row, text).is_some()) => Ok(()),
+            Some(&text)
+                if table.rows().all(|row| row.cell(text).is_empty() || table.without_sign(row, text).is_some()) =>
+            {
+                Ok(())
+            }
             // Where no column has any, the file is another one.
             Some(&text) if self.joints.iter().any(|&c| written(c).any(is_number)) => {
                 let what = format!(

@@ -133,7 +133,8 @@ pub fn check_unit(
 fn refuse_counts(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f64]]) -> Result<()> {
     let joints = revolute(chain).count();
     let are_counts = |q: &&&[f64]| 2 * revolute(chain).filter(|&i| q[i].abs() > TEN_TURNS_DEG).count() > joints;
-    if 2 * rows.iter().filter(are_counts).count() <= rows.len() {
+    // A turntable by itself may have gone round so often.
+    if joints < 2 || 2 * rows.iter().filter(are_counts).count() <= rows.len() {
         return Ok(());
     }
     let (joint, (low, high)) = widest(chain, rows);
@@ -276,12 +277,12 @@ pub(super) fn notices(file: &Path, (stops, view): (&Stops, bool), unit: AngleUni
     notices
 }
 
-/// Whether a column differs from stop to stop.
+/// Whether a column differs from stop to stop, by more than noise and otherwise than a clock or a counter.
 fn varies(stops: &Stops, joint: &str) -> bool {
-    let column = stops.joints.iter().position(|j| j == joint);
-    let mut readings =
-        column.into_iter().flat_map(|c| stops.stops.iter().filter_map(move |s| s.raw_readings.as_ref()?.get(c)));
-    readings.next().is_some_and(|first| readings.any(|other| other != first))
+    let Some(column) = stops.joints.iter().position(|j| j == joint) else { return false };
+    let readings: Vec<f64> = stops.stops.iter().filter_map(|s| s.raw_readings.as_ref()?.get(column).copied()).collect();
+    let (low, high) = readings.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(*q), h.max(*q)));
+    high - low > UNMOVED && !readings.windows(2).all(|pair| pair[0] < pair[1])
 }
 
 /// Columns that are read, and of which no joint term makes use.
@@ -295,6 +296,9 @@ fn unused_covariates(file: &Path, stops: &Stops) -> Option<Notice> {
     let remedy = "they may stay; the result is the same without them";
     (!columns.is_empty()).then(|| Notice::new(Code::CovariatesUnused, file.display(), what, remedy))
 }
+
+/// Readings of an axis that stands still differ by less, in any unit.
+const UNMOVED: f64 = 1e-3;
 
 /// One over the last digit that is shown of a reading; what it does not show is rounding.
 const SHOWN: f64 = 1e4;

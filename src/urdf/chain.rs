@@ -148,12 +148,19 @@ impl Chain {
         joints.map(|j| j.origin.translation.norm()).sum()
     }
 
-    /// Where the link stands that carries the first moving joint, `base_from_foot`: what is fixed before it is no part of the arm. `None` where
-    /// that link is the base itself, and where the base moves.
+    /// Where the link stands that carries the first moving joint, `base_from_foot`: what is fixed before it is no part of the arm. One that is only
+    /// turned about the vertical looks as the base does. `None` where it stands as the base does, and where the base moves.
     pub fn base_from_foot(&self) -> Option<Pose> {
         let fixed = self.joints.iter().take_while(|j| j.kind == JointKind::Fixed).count();
-        let is_apart = fixed > 0 && fixed < self.joints.len() && !self.base_moves();
-        is_apart.then(|| self.joints[..fixed].iter().fold(Pose::identity(), |pose, j| pose * j.origin))
+        if fixed == self.joints.len() || self.base_moves() {
+            return None;
+        }
+        let mut foot = self.joints[..fixed].iter().fold(Pose::identity(), |pose, j| pose * j.origin);
+        let is_upright = 1.0 - foot.rotation[(2, 2)] < f64::EPSILON.sqrt();
+        if is_upright {
+            foot.rotation.fill_with_identity();
+        }
+        (!is_upright || foot.translation.norm() > 0.0).then_some(foot)
     }
 
     /// True where camera and plate are both carried: the base moves, too.

@@ -377,6 +377,7 @@ const SHOWN: [&str; 11] = [
 const COMPARED: &[(&str, &str, &str)] = &[
     ("assess/points.rs", "step.norm() < 1e-12", "convergence"),
     ("identify/two_stage/fit.rs", "**r > 1e-9", "rounding of a redundancy"),
+    ("diagnose/joint_noise.rs", "1e-3 * accuracy.calibrated.rms_mm", "a unit"),
     ("cli/series/plan.rs", "args.tilt_deg >= 85.0", "range of an option"),
     ("cli/series/plan.rs", "args.camera_fov_deg >= 170.0", "range of an option"),
     ("cli/series/simulate.rs", "5.0..140.0", "range of an option"),

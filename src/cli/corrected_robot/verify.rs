@@ -222,7 +222,7 @@ fn say_moved(DeviceMoved { first, by_m, rms_m, cause }: &DeviceMoved) {
             "moved     the device, or the base, stands {by_mm} mm elsewhere from row {row} on (without that {rms_mm} mm RMS): judge the rows before and after alone"
         ),
         StepCause::DeviceOrRobot => say_line!(
-            "moved?    from row {row} on the points are {by_mm} mm elsewhere (without that {rms_mm} mm RMS), which errors of the robot explain as well: judge the rows before and after alone, or measure in another order"
+            "moved?    from row {row} on the points are {by_mm} mm elsewhere (without that {rms_mm} mm RMS), which errors of the robot may explain as well: judge the rows before and after alone, or measure in another order"
         ),
     }
 }

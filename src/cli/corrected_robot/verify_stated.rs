@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector6;
 
 use super::compensate_frames::{Side, solution};
-use crate::assess::{Limits, MeasuredPoint, NORMAL_95, PredictedFlange, fit_points, most_of_sum, root_mean_square};
+use crate::assess::{
+    Limits, MeasuredPoint, NORMAL_95, PredictedFlange, by_readings, fit_points, most_of_sum, root_mean_square,
+};
 use crate::cli::results::show::read_solution;
 use crate::model::robot::{Posture, Robot};
 use crate::output::ALONE;
@@ -163,16 +165,6 @@ fn is_input(record: &SolutionRecord, file: &InputFile) -> bool {
 fn rms(lengths: impl Iterator<Item = f64>) -> f64 {
     let squares: Vec<(f64, f64)> = lengths.map(|m| (m * m, 1.0)).collect();
     if squares.is_empty() { 0.0 } else { root_mean_square(&squares) }
-}
-
-/// Mean squares of the displacement of the tip by unit errors of every reading at stops, m^2.
-fn by_readings(robot: &Robot, stops: &[Posture]) -> Vec<f64> {
-    let mut sums = vec![0.0; robot.chain.readings.len()];
-    for stop in stops {
-        let by = robot.kinematics(stop, &vec![0.0; stop.readings.len()]).d_readings;
-        sums.iter_mut().zip(&by).for_each(|(sum, d)| *sum += d.fixed_rows::<3>(0).norm_squared());
-    }
-    sums.into_iter().map(|sum| sum / stops.len().max(1) as f64).collect()
 }
 
 /// How the tip of a second robot stands to that of a first one, without what a tool takes up: body twists.

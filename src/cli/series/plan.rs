@@ -259,7 +259,7 @@ fn settle_place(args: &PlanArgs, request: &mut PlanRequest) -> Result<Vec<String
     }
     let chain = &request.setting.robot.chain;
     let arm = chain.arm_length_m();
-    let of = chain.base_from_foot().map_or("", |_| " from the foot of the robot");
+    let of = chain.base_from_foot().map_or("", |_| " in the frame of the foot of the robot");
     let place = |name: &str, far: f64, high: f64, tilt_deg: f64| {
         let pose = before_robot(chain, far, high, tilt_deg);
         (format!("{name} (x {:.2} m, z {:.2} m{of}, tilted {tilt_deg:.0} degrees)", far * arm, high * arm), pose)

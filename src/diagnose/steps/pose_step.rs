@@ -13,8 +13,8 @@
 //! has a beta distribution where noise is Gaussian; what the step leaves of `R + P` says how much of them it explains. Priors on several columns together
 //! are part of the information and of `P`. `R` has every direction of the poses that were seen: what two cameras contradict each other by is in it.
 //! Where errors repeat over neighbouring readings, several stops count as one. Real robots err alike in postures that are alike, so that chance alone
-//! does not acquit them: the step must also explain most of `R`; one that explains less, but much, is a doubt. Its shift or its turn must be beyond
-//! its own sigma.
+//! does not acquit them: the step must also explain most of `R`; one that explains less, but much, is a doubt. It must be beyond
+//! its own sigmas.
 //!
 //! Several targets on the tip may be held by one bracket: its twist `x` about their middle moves each of them, `A = sum_k T_k B_k`, with the columns
 //! `T_k` of a target and `B_k = [R' , -R' [d]; 0, R']` of its rotation `R` in the tip and its place `d` from the middle.
@@ -85,7 +85,7 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
             good.clone_from(&found);
         }
     }
-    good.retain(|step| step.still_counts() && step.is_beyond(limits.displaced_sigmas));
+    good.retain(|step| step.is_beyond(limits.displaced_sigmas));
     let first = |step: &Step| step.shown.first().map(|shown| shown.place(problem));
     good.sort_by_key(|s| (matches!(s.order, Order::Up(_)), first(s)));
     good

@@ -40,7 +40,7 @@ impl Verdict {
     pub fn of(record: &SolutionRecord) -> Self {
         if !record.failed_gates.is_empty() {
             let gates = record.failed_gates.iter().map(|gate| of_gate(record, gate));
-            return Self::failed(of_columns(&record.notices).chain(gates).collect(), of_rows(record));
+            return Self::failed(gates.collect(), of_columns(&record.notices).chain(of_rows(record)));
         }
         Self::not_failed(noted(&record.notices).collect())
     }
@@ -67,10 +67,10 @@ impl Verdict {
     }
 }
 
-/// An axis that moves and is not described is the likely cause of all else that failed.
-fn of_columns(notices: &[Notice]) -> impl Iterator<Item = VerdictReason> {
-    let moving = notices.iter().filter(|n| n.code == Code::JointUnusedMoves);
-    moving.map(|n| VerdictReason { what: format!("{}: {}", n.place, n.what), remedy: n.remedy.clone() })
+/// An axis that moves and is not described may be the cause of what failed.
+fn of_columns(notices: &[Notice]) -> impl Iterator<Item = String> + use<> {
+    let moving: Vec<Notice> = notices.iter().filter(|n| n.code == Code::JointUnusedMoves).cloned().collect();
+    Notice::said_once(&moving).into_iter().map(|n| format!("{}: {}: {}", n.place, n.what, n.remedy))
 }
 
 /// Rows of readings that stand beside the wrong images are to be put right whatever else failed, and a better lens that could not be fitted is
@@ -100,7 +100,8 @@ fn noted(notices: &[Notice]) -> impl Iterator<Item = VerdictReason> + use<> {
 fn is_information(code: Code) -> bool {
     matches!(
         code,
-        Code::DictionaryGuessed
+        Code::CovariatesUnused
+            | Code::DictionaryGuessed
             | Code::FewGreyLevels
             | Code::HotPixels
             | Code::ImageDelayFound

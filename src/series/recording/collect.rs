@@ -42,20 +42,20 @@ pub struct StopReport {
 
 /// Images of a stop that differ so many times more than those of the quietest quarter of the stops show several things.
 const UNLIKE: f64 = 5.0;
-/// Rounding to whole counts.
-const ROUNDING_COUNTS: f64 = 0.29;
+/// Noise below this, counts, is that of pictures without any.
+const LEAST_NOISE_COUNTS: f64 = 1.0;
 
 /// Averages of images that do not show the same.
 pub(super) fn unlike(recording: &Path, reports: &[StopReport]) -> Option<Notice> {
     let mut noises: Vec<(f64, &str)> =
         reports.iter().filter_map(|r| Some((r.noise_counts?, r.image.as_str()))).collect();
     noises.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let usual = noises.get(noises.len() / 4)?.0.max(ROUNDING_COUNTS);
+    let usual = noises.get(noises.len() / 4)?.0.max(LEAST_NOISE_COUNTS);
     let (most, image) = *noises.last()?;
     let count = noises.iter().filter(|(noise, _)| *noise > UNLIKE * usual).count();
     let what = format!(
         "the images of {count} of {} stops differ by more than their noise, those of {image} by {most:.1} counts where {usual:.1} are usual: \
-         their average mixes images of motion with others",
+         their average mixes images that do not show the same (motion, light)",
         noises.len()
     );
     let remedy = "take the sharpest image instead of the average, and find out whether the images are late (--image-delay SECONDS)";

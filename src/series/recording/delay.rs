@@ -94,7 +94,8 @@ impl Delay {
 /// Said where the delay cannot be measured.
 pub(super) fn unchecked(recording: &Path) -> Notice {
     let what = format!(
-        "whether the images are late could not be checked: it takes {} images about motions of a robot that stops, not more than {} s apart",
+        "whether the images are late could not be checked: it takes {} images about motions of a robot that stops, not more than {} s apart, \
+         that change with the motion",
         PICTURES.start(),
         1e-9 * LONGEST_STEP_NS as f64
     );

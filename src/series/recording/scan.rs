@@ -406,6 +406,9 @@ impl Scan {
         let reason = self.topics.get(topic).map_or("", |t| t.reason.as_str());
         let place = format!("{}, topic {topic}", self.recording.display());
         let (reason, remedy) = match reason {
+            "" if wanted.what != JOINTS.what || self.notices.iter().any(|n| n.code == Code::ClockSetBack) => {
+                (String::new(), "record it again")
+            }
             "" => (
                 ": they hold no positions".into(),
                 "name a topic with positions (--joint-topic), or let the driver send them",
