@@ -148,7 +148,7 @@ fn small_rings_in_a_blurred_picture_with_gamma_are_measured() {
         let smallest = standard_plate().markers.iter().map(|m| m.outer_radius_m).fold(f64::MAX, f64::min);
         view.distance_m = view.focal_px * smallest / 8.0;
         (view.conditions.psf_sigma_px, view.conditions.full_well_e, view.conditions.bits) =
-            (psf_sigma_px, full_well_e, 12);
+            (psf_sigma_px, full_well_e, 8);
         let scene = scene(&view);
         let mut picture = scene.render(7);
         let full_scale = picture.full_scale;
