@@ -1,31 +1,10 @@
 //! External axes `E1` to `E6`: where motions leave those that the description lacks. What a position leaves out keeps its place.
 
-use super::aggregate::{external_axis, external_name, is_foreign};
+use super::aggregate::{external_name, is_foreign};
 use super::{Aggregate, Module, Now, Value, unset};
 use crate::programs::external::OffZero;
 use crate::programs::flow::{Either, Held};
 use crate::programs::program::Understood;
-use crate::programs::scan::Reader;
-
-/// Moves external axes beside the program.
-pub(super) const BESIDE: &str = "ASYPTP";
-
-/// Notes the external axes that a text puts elsewhere than at zero, at places that count as not known.
-pub(super) fn look_through(all: &mut OffZero, mut reader: Reader<'_>) {
-    while !reader.done() {
-        let axis = reader.name().and_then(|name| external_axis(&name));
-        let is_in_list = [b'{', b',', b':'].iter().any(|mark| reader.ahead_is_mark(-1, *mark));
-        let is_set = reader.ahead_is_mark(-1, b'.') && reader.ahead_is_mark(1, b'=') && !reader.ahead_is_mark(2, b'=');
-        reader.at += 1;
-        let Some(axis) = axis.filter(|_| is_in_list || is_set) else { continue };
-        reader.take_mark(b'=');
-        let number = reader.take_number().map(|(value, _)| value);
-        let ends = reader.at_line_end() || reader.is_mark(b',') || reader.is_mark(b'}');
-        if number != Some(0.0) || !ends {
-            all.put(axis, None);
-        }
-    }
-}
 
 impl Module<'_> {
     /// Where a program begins, or a routine that no file calls: the program before may have left the axes anywhere.

@@ -11,6 +11,7 @@ mod frames;
 mod given;
 mod motions;
 mod moves;
+mod off_zero;
 mod orientation;
 mod reads;
 mod scopes;
@@ -122,7 +123,7 @@ fn reading(
     let mut references = References::default();
     for (index, file) in files.iter().enumerate() {
         module.assigned.look_through(reader(index, file)?, !has_moves(file));
-        external::look_through(&mut module.off_zero_anywhere, reader(index, file)?);
+        off_zero::look_through(&mut module.off_zero_anywhere, reader(index, file)?);
         if has_moves(file) {
             module.uses.look_through(reader(index, file)?);
             module.resumes |= calls::resumes(reader(index, file)?);
@@ -207,7 +208,7 @@ impl Module<'_> {
                 self.leave_at(reader.index, reader.line(), &word, why);
                 self.may_carry();
                 self.time_passes();
-            } else if moves && word == external::BESIDE {
+            } else if moves && word == off_zero::BESIDE {
                 self.may_carry();
             } else if moves && is_beside(&reader) {
                 self.sets_beside(&mut reader);

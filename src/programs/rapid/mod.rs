@@ -5,6 +5,7 @@ mod calls;
 mod carried;
 mod frames;
 mod moves;
+mod off_zero;
 mod scopes;
 mod statements;
 mod switched;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::carried::external_axes;
+use super::off_zero::external_axes;
 use super::switched::{DISPLACES, OFFSETS, Switched, Watched, locks, switch};
 use crate::programs::external::OffZero;
 use crate::programs::flow::{Branching, Flow, Followed, Places};

@@ -1,0 +1,36 @@
+//! External axes that targets, and assignments to them, put elsewhere than at zero.
+
+use super::value::{NO_AXIS, Node, node};
+use crate::programs::external::OffZero;
+use crate::programs::scan::Reader;
+
+/// Where a target puts its external axes, by their number from 0; `None` where it does not tell of any, or has none of its own.
+pub(super) fn places(target: &Node) -> Option<Vec<(usize, Option<f64>)>> {
+    let Node::List(parts) = target else { return None };
+    let Node::List(external) = parts.last()? else { return None };
+    let place = |node: &Node| if let Node::Number(value, _) = node { Some(*value) } else { None };
+    let all = external.iter().map(place).enumerate();
+    Some(all.filter(|(_, place)| place.is_none_or(|value| value < NO_AXIS)).collect())
+}
+
+/// Notes the external axes that a target, or an assignment to one of them, puts elsewhere than at zero where the reader stands.
+pub(super) fn external_axes(all: &mut OffZero, reader: &mut Reader<'_>) {
+    let start = reader.at;
+    let mut put = |places: Vec<(usize, Option<f64>)>| {
+        let off_zero = places.into_iter().filter(|(_, place)| *place != Some(0.0));
+        off_zero.for_each(|(axis, _)| all.put(axis, None));
+    };
+    let letter = reader.name().filter(|_| reader.ahead_is_mark(-1, b'.'));
+    let axis = letter.and_then(|name| "ABCDEF".find(name.strip_prefix("EAX_")?));
+    if let Some(axis) = axis.filter(|_| reader.ahead_is_mark(1, b':') && reader.ahead_is_mark(2, b'=')) {
+        reader.at += 3;
+        let number = reader.take_number().map(|(value, _)| value).filter(|_| reader.is_mark(b';'));
+        put(vec![(axis, number)]);
+    } else if reader.is_mark(b'[')
+        && let Ok(target) = node(reader)
+        && (target.is_robtarget() || target.is_jointtarget())
+    {
+        put(places(&target).unwrap_or_default());
+    }
+    reader.at = start;
+}
