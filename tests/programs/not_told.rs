@@ -214,6 +214,32 @@ fn poses_that_leave_out_an_external_axis_are_left_where_it_may_stand_elsewhere_t
     }
 }
 
+/// Such data (`CONST extjoint pExt:=[500,..]`) may put an axis elsewhere.
+#[test]
+fn external_axes_of_rapid_that_a_target_has_by_name_may_stand_elsewhere_than_at_zero() {
+    let cell = Cell::kuka(69);
+    let q: Vec<f64> = START.iter().map(|q| q.to_radians()).collect();
+    let axes = START.map(|q| format!("{q:.1}")).join(",");
+    let none = "9E9,9E9,9E9,9E9,9E9,9E9";
+    let target = robtarget(&cell.nominal.base_from_tip(&q), UNCHECKED);
+    let by_name = target.replace(&format!("[{none}]"), "pExt");
+    let [computed, external] = [LeftReason::Computed, LeftReason::ExternalAxis].map(LeftReason::name);
+    let go = |what: &str| format!("{what},v10,fine,tool0;\n");
+    let declared = format!("CONST robtarget pHere:={target};\nCONST extjoint pExt:=[500,9E9,9E9,9E9,9E9,9E9];\n");
+    let only_external = format!("CONST jointtarget jExt:=[[{none}],pExt];\n");
+    for (before, data, corrected, left) in [
+        (go(&format!("MoveJ {by_name}")), "", 0, vec![computed, external]),
+        (go(&format!("MoveAbsJ [[{axes}],pExt]")), "", 0, vec![computed, external]),
+        ("MoveExtJ jExt,v10,fine;\n".to_owned(), only_external.as_str(), 0, vec![external]),
+    ] {
+        let there = go("MoveJ pHere");
+        let text = format!("MODULE m\n{declared}{data}PROC main()\nConfJ\\Off;\n{before}{there}ENDPROC\nENDMODULE\n");
+        let start = format!("--start={axes}");
+        let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
+        assert_eq!(told(&cell, &[("m.mod", text)], &[&start]), (corrected, left), "{before}");
+    }
+}
+
 #[test]
 fn poses_behind_branches_that_set_tool_frame_or_displacement_differently_are_left() {
     let mut cell = Cell::kuka(67);

@@ -30,7 +30,10 @@ pub(super) fn external_axes(all: &mut OffZero, reader: &mut Reader<'_>) {
         && let Ok(target) = node(reader)
         && (target.is_robtarget() || target.is_jointtarget())
     {
-        put(places(&target).unwrap_or_default());
+        // What is taken from a target (`p.extax`) is noted where that target stands.
+        let is_copy = reader.ahead_is_word(-2, "EXTAX") && reader.ahead_is_mark(-3, b'.');
+        let anywhere = || (0..6).filter(|_| !is_copy).map(|axis| (axis, None)).collect();
+        put(places(&target).unwrap_or_else(anywhere));
     }
     reader.at = start;
 }

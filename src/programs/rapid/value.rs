@@ -30,10 +30,10 @@ impl Node {
         has_shape(parts, &ROBTARGET) && parts[..2].iter().all(|part| matches!(part, Self::List(_)))
     }
 
-    /// Axes of the arm, and external ones.
+    /// Axes of the arm, and external ones, which may be computed.
     pub fn is_jointtarget(&self) -> bool {
         let Self::List(parts) = self else { return false };
-        has_shape(parts, &JOINTTARGET) && parts.iter().all(|part| matches!(part, Self::List(_)))
+        has_shape(parts, &JOINTTARGET) && matches!(parts[0], Self::List(_))
     }
 
     /// How many values stand in its brackets.
