@@ -189,6 +189,8 @@ fn poses_that_leave_out_an_external_axis_are_left_where_it_may_stand_elsewhere_t
         (format!("{far}sub()\nEND\nDEF sub()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{there}"), 1, 1),
         // A program before this one, or the last run of it, may have left the axis there.
         (format!("{there}{far}"), 1, 1),
+        // A variable of that name is no axis.
+        (format!("DECL INT N,E1\n{there}sub(1,E1)\n"), 1, 0),
     ] {
         let src = |body: &str| format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{body}END\n");
         let found = told(&cell, &[("a.src", src(&body))], &[&start]);

@@ -2,16 +2,23 @@
 
 use super::aggregate::external_axis;
 use crate::programs::external::OffZero;
-use crate::programs::scan::Reader;
+use crate::programs::scan::{Reader, TokenKind};
 
 /// Moves external axes beside the program.
 pub(super) const BESIDE: &str = "ASYPTP";
 
 /// Notes the external axes that a text puts elsewhere than at zero, at places that count as not known.
 pub(super) fn look_through(all: &mut OffZero, mut reader: Reader<'_>) {
+    let mut open = Vec::new();
     while !reader.done() {
+        match reader.peek().map(|token| token.kind) {
+            Some(TokenKind::Mark(mark @ (b'{' | b'(' | b'['))) => open.push(mark),
+            Some(TokenKind::Mark(b'}' | b')' | b']')) => _ = open.pop(),
+            _ => {}
+        }
         let axis = reader.name().and_then(|name| external_axis(&name));
-        let is_in_list = [b'{', b',', b':'].iter().any(|mark| reader.ahead_is_mark(-1, *mark));
+        let is_element = [b'{', b',', b':'].iter().any(|mark| reader.ahead_is_mark(-1, *mark));
+        let is_in_list = is_element && open.last() == Some(&b'{');
         let is_set = reader.ahead_is_mark(-1, b'.') && reader.ahead_is_mark(1, b'=') && !reader.ahead_is_mark(2, b'=');
         reader.at += 1;
         let Some(axis) = axis.filter(|_| is_in_list || is_set) else { continue };
