@@ -92,11 +92,15 @@ impl Columns {
     }
 }
 
-/// True for the name of a column of an external axis: `E1` of KRL, `eax_a` of RAPID, `ext..`.
+/// True for the name of a column of an external axis: `E1` of KRL, `eax_a` of RAPID, `ext1`, `ext_1`, `extaxis_1`.
 fn is_external(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    name.strip_prefix('e').is_some_and(is_number) || name.starts_with("eax_") || name.starts_with("ext")
+    let numbered = name.strip_prefix("ext").map(|rest| {
+        let rest = rest.strip_prefix("axis").unwrap_or(rest);
+        rest.strip_prefix('_').unwrap_or(rest)
+    });
+    [name.strip_prefix('e'), numbered].into_iter().flatten().any(is_number) || name.starts_with("eax_")
 }
 
 fn columns(file: &TextFile, header: &Row, setting: &ProgramSetting<'_>) -> Result<Columns> {

@@ -99,7 +99,7 @@ fn rows_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_a
     let pose = cell.nominal.base_from_tip(&[0.17, -1.4, 1.7, 0.35, 0.7, 0.5]);
     let flange: Vec<String> = pose.xyz().iter().chain(&pose.quaternion_xyzw()).map(|v| format!("{v:.9}")).collect();
     let external = LeftReason::ExternalAxis.name();
-    for name in ["E1", "eax_a", "ext_1"] {
+    for name in ["E1", "eax_a", "ext1", "ext_1", "extaxis1", "extaxis_1"] {
         let mut table = format!("name,x_m,y_m,z_m,qx,qy,qz,qw,{name},speed\n");
         ["0", "500", "", "0.0", ""].iter().for_each(|at| table += &format!("P,{},{at},250\n", flange.join(",")));
         let file = cell.write("t.csv", table.as_bytes());
@@ -112,6 +112,14 @@ fn rows_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_a
         assert_eq!(columns, [16; 6], "every row has all cells");
         let apart = cell.compensate(&[&file], &["--joint-unit", "deg", "--unordered", "--axes-apart"]).expect(0);
         assert_eq!(apart.told().corrected, 5);
+    }
+    // Columns of something else.
+    for name in ["extra", "extruder_speed", "extension_mm", "ext_force"] {
+        let table = format!("x_m,y_m,z_m,qx,qy,qz,qw,{name}\n{},500\n", flange.join(","));
+        let file = cell.write("t.csv", table.as_bytes());
+        let run = cell.compensate(&[&file], &["--joint-unit", "deg", "--unordered"]).expect(0);
+        assert_eq!(run.told().corrected, 1, "{name}");
+        assert!(run.said().contains(Code::JointUnused.name()), "{}", run.said());
     }
 }
 
