@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 use super::held::Either;
 use super::reason::Why;
 
+/// What RAPID writes for an external axis that a target does not use (ABB, *Technical reference manual: RAPID Instructions, Functions and Data types*, `extjoint`), and beyond.
+pub(super) const NO_AXIS: f64 = 9e9;
+
 /// Those that may stand elsewhere than at zero, by their number from 0: in the unit of the program, `None` where the text does not tell where.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct OffZero(BTreeMap<usize, Option<f64>>);

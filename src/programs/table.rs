@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::ProgramSetting;
 use super::compensate::empty_cells;
-use super::external::OffZero;
+use super::external::{NO_AXIS, OffZero};
 use super::field::{Edit, Field, FieldPlace};
 use super::program::{
     Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind,
@@ -211,11 +211,12 @@ impl Table<'_> {
         Ok(Target { approach, ..Target::at((self.index, row.line), name, kind) })
     }
 
-    /// Why the pose of a row stays as it is: an axis that the description lacks is not at zero, in its cell or where an empty one leaves it.
+    /// Why the pose of a row stays as it is: an axis that the description lacks is not at zero, in its cell or where an empty one, or one that says it is not used, leaves it.
     fn external(&self, row: &Row, off_zero: &mut OffZero) -> Option<Why> {
         let name = |column: usize| self.columns.names[column].clone();
         let cells = self.columns.external.iter().map(|&column| (column, self.cell(row, column)));
-        let (empty, written): (Vec<_>, Vec<_>) = cells.partition(|(_, cell)| cell.is_empty());
+        let is_unused = |cell: &str| cell.parse::<f64>().is_ok_and(|value| value.is_finite() && value >= NO_AXIS);
+        let (empty, written): (Vec<_>, Vec<_>) = cells.partition(|(_, cell)| cell.is_empty() || is_unused(cell));
         for (column, cell) in &written {
             off_zero.put(*column, cell.parse::<f64>().ok().filter(|value| value.is_finite()));
         }

@@ -92,7 +92,7 @@ fn a_program_that_is_corrected_already_is_not_corrected_twice() {
     assert_eq!(weight(&by_hand, Code::CorrectedAlready).as_deref(), Some("note"), "{}", by_hand.said());
 }
 
-/// Columns of external axes beside poses; an empty cell leaves the axis where it is.
+/// Columns of external axes beside poses; an empty cell, or one that says it is not used, leaves the axis where it is.
 #[test]
 fn rows_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_at_zero() {
     let cell = Cell::kuka(125);
@@ -101,17 +101,19 @@ fn rows_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_a
     let external = LeftReason::ExternalAxis.name();
     for name in ["E1", "eax_a", "ext1", "ext_1", "extaxis1", "extaxis_1"] {
         let mut table = format!("name,x_m,y_m,z_m,qx,qy,qz,qw,{name},speed\n");
-        ["0", "500", "", "0.0", ""].iter().for_each(|at| table += &format!("P,{},{at},250\n", flange.join(",")));
+        ["0", "9E9", "500", "", "9E+09", "0.0", ""]
+            .iter()
+            .for_each(|at| table += &format!("P,{},{at},250\n", flange.join(",")));
         let file = cell.write("t.csv", table.as_bytes());
         let run = cell.compensate(&[&file], &["--joint-unit", "deg", "--unordered"]).expect(1);
         let left: Vec<(usize, String)> = run.told().left.into_iter().map(|(line, _, reason)| (line, reason)).collect();
-        assert_eq!(left, [(3, external.to_owned()), (4, external.to_owned())], "{}", run.said());
-        assert_eq!(run.told().corrected, 3);
+        assert_eq!(left, [4, 5, 6].map(|line| (line, external.to_owned())), "{}", run.said());
+        assert_eq!(run.told().corrected, 4);
         assert!(run.said().contains(Code::JointUnused.name()), "{}", run.said());
         let columns: Vec<usize> = run.text("t.csv").lines().map(|line| line.split(',').count()).collect();
-        assert_eq!(columns, [16; 6], "every row has all cells");
+        assert_eq!(columns, [16; 8], "every row has all cells");
         let apart = cell.compensate(&[&file], &["--joint-unit", "deg", "--unordered", "--axes-apart"]).expect(0);
-        assert_eq!(apart.told().corrected, 5);
+        assert_eq!(apart.told().corrected, 7);
     }
     // Columns of something else.
     for name in ["extra", "extruder_speed", "extension_mm", "ext_force"] {

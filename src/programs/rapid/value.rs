@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
+pub(super) use crate::programs::external::NO_AXIS;
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::Reader;
 
@@ -241,9 +242,6 @@ pub(super) fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result
     }
     Ok(())
 }
-
-/// An external axis that is not there.
-pub(super) const NO_AXIS: f64 = 9e9;
 
 /// True for a jointtarget in which all axes of the arm stay where they are.
 pub(super) fn is_of_external_axes(target: &Node) -> bool {
