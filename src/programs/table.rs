@@ -163,7 +163,7 @@ pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result
             let names = setting.chain.readings.iter().map(|n| format!("{}{}", char::from(separator), quoted(n)));
             program.edits.push(Edit { file: index, range: header.end..header.end, text: names.collect() });
         }
-        let (mut from, mut off_zero) = (Approach::Unknown, OffZero::default());
+        let (mut from, mut off_zero) = (Approach::Unknown, table.off_zero_anywhere(rows));
         for row in rows {
             let target = table.target(row, from)?;
             let why = table.external(row, &mut off_zero).filter(|_| !setting.axes_apart);
@@ -211,19 +211,36 @@ impl Table<'_> {
         Ok(Target { approach, ..Target::at((self.index, row.line), name, kind) })
     }
 
-    /// Why the pose of a row stays as it is: an axis that the description lacks is not at zero, in its cell or where an empty one, or one that says it is not used, leaves it.
+    /// Where a row puts external axes, by their columns: `None` where the text does not tell. An empty cell, or one that says that the axis is
+    /// not used, leaves it where it is.
+    fn places(&self, row: &Row) -> Vec<(usize, Option<f64>)> {
+        let place = |column: usize| {
+            let cell = self.cell(row, column);
+            let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
+            let is_left = cell.is_empty() || value.is_some_and(|value| value >= NO_AXIS);
+            (!is_left).then_some((column, value))
+        };
+        self.columns.external.iter().filter_map(|&column| place(column)).collect()
+    }
+
+    /// Axes that any row puts elsewhere than at zero: the last run may have left them there.
+    fn off_zero_anywhere(&self, rows: &[Row]) -> OffZero {
+        let whole = rows.iter().filter(|row| row.cells.len() == self.columns.names.len());
+        let mut all = OffZero::default();
+        let places = whole.flat_map(|row| self.places(row)).filter(|(_, place)| *place != Some(0.0));
+        places.for_each(|(column, _)| all.put(column, None));
+        all
+    }
+
+    /// Why the pose of a row stays as it is: an axis that the description lacks is not at zero, where the row puts it or leaves it.
     fn external(&self, row: &Row, off_zero: &mut OffZero) -> Option<Why> {
         let name = |column: usize| self.columns.names[column].clone();
-        let cells = self.columns.external.iter().map(|&column| (column, self.cell(row, column)));
-        let is_unused = |cell: &str| cell.parse::<f64>().is_ok_and(|value| value.is_finite() && value >= NO_AXIS);
-        let (empty, written): (Vec<_>, Vec<_>) = cells.partition(|(_, cell)| cell.is_empty() || is_unused(cell));
-        for (column, cell) in &written {
-            off_zero.put(*column, cell.parse::<f64>().ok().filter(|value| value.is_finite()));
-        }
-        let moved = written.iter().find(|(_, cell)| cell.parse::<f64>().ok() != Some(0.0));
+        let places = self.places(row);
+        places.iter().for_each(|(column, place)| off_zero.put(*column, *place));
+        let moved = places.iter().find(|(_, place)| *place != Some(0.0));
         moved
-            .map(|(column, cell)| Why::external(&name(*column), cell))
-            .or_else(|| off_zero.why_kept(|column| empty.iter().any(|(is_empty, _)| *is_empty == column), name))
+            .map(|(column, _)| Why::external(&name(*column), self.cell(row, *column)))
+            .or_else(|| off_zero.why_kept(|column| places.iter().all(|(placed, _)| *placed != column), name))
     }
 
     /// Columns with numbers of which nothing is read.

@@ -115,6 +115,12 @@ fn rows_with_an_external_axis_that_the_description_lacks_are_left_unless_it_is_a
         let apart = cell.compensate(&[&file], &["--joint-unit", "deg", "--unordered", "--axes-apart"]).expect(0);
         assert_eq!(apart.told().corrected, 7);
     }
+    // The last run may have left the axis at 500.
+    let rows: String = ["", "9E9", "0", "", "500"].map(|at| format!("{},{at}\n", flange.join(","))).concat();
+    let file = cell.write("t.csv", format!("x_m,y_m,z_m,qx,qy,qz,qw,E1\n{rows}").as_bytes());
+    let told = cell.compensate(&[&file], &["--joint-unit", "deg", "--unordered"]).expect(1).told();
+    let left: Vec<(usize, String)> = told.left.into_iter().map(|(line, _, reason)| (line, reason)).collect();
+    assert_eq!((told.corrected, left), (2, [2, 3, 6].map(|line| (line, external.to_owned())).to_vec()));
     // Columns of something else.
     for name in ["extra", "extruder_speed", "extension_mm", "ext_force"] {
         let table = format!("x_m,y_m,z_m,qx,qy,qz,qw,{name}\n{},500\n", flange.join(","));
