@@ -44,7 +44,7 @@ impl WrittenProgram {
 pub enum WrittenAs {
     /// It was written with just these bytes.
     Itself,
-    /// A file of its name was written or listed there.
+    /// A file of its name was written, or targets of it are listed there that were changed.
     Other,
 }
 
@@ -60,11 +60,12 @@ pub fn written_as(program: &Path, bytes: &[u8]) -> Option<WrittenAs> {
     }
     let table = beside(TABLE)?;
     let mut rows = csv::Reader::from_reader(table.as_bytes());
-    if rows.headers().ok()?.get(0) != Some("file") {
-        return None;
-    }
+    let headers = rows.headers().ok().filter(|headers| headers.get(0) == Some("file"))?;
+    let reason = headers.iter().position(|name| name == "reason");
     let is_own = |row: &csv::StringRecord| row.get(0).map(Path::new).and_then(Path::file_name) == program.file_name();
-    rows.records().filter_map(Result::ok).any(|row| is_own(&row)).then_some(WrittenAs::Other)
+    // A target that was left has a reason.
+    let is_changed = |row: &csv::StringRecord| reason.and_then(|at| row.get(at)).is_none_or(str::is_empty);
+    rows.records().filter_map(Result::ok).any(|row| is_own(&row) && is_changed(&row)).then_some(WrittenAs::Other)
 }
 
 #[cfg(test)]
@@ -87,5 +88,10 @@ mod tests {
         std::fs::write(folder.path().join(TABLE), "file,line\n\"cell/p.src\",2\n").unwrap();
         assert_eq!(written_as(&program, b"a"), Some(WrittenAs::Other));
         assert_eq!(written_as(&folder.path().join("q.src"), b"a"), None);
+        // All its targets were left.
+        let rows = "file,line,reason\np.src,2,computed\nq.src,3,\nq.src,4,computed\n";
+        std::fs::write(folder.path().join(TABLE), rows).unwrap();
+        assert_eq!(written_as(&program, b"a"), None);
+        assert_eq!(written_as(&folder.path().join("q.src"), b"a"), Some(WrittenAs::Other));
     }
 }
