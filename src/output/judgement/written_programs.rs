@@ -11,7 +11,7 @@ use crate::error::Code;
 use crate::files::{self, FileKind};
 use crate::series::InputFile;
 
-/// A corrected file: a finding with the hash of its bytes.
+/// A file whose targets were changed: a finding with the hash of its bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WrittenProgram {
     #[serde(flatten)]
@@ -27,7 +27,7 @@ fn sha256(bytes: &[u8]) -> String {
 impl WrittenProgram {
     /// A file of this name, written with other bytes than it was read with.
     pub fn new(name: &str, bytes: &[u8]) -> Self {
-        let text = "it is corrected; to correct it for another robot or another calibration, take the program from which it was made";
+        let text = "its targets were changed; to correct it for another robot or another calibration, take the program from which it was made";
         let finding = FileFinding {
             code: Code::ProgramWritten,
             weight: Weight::Note,
