@@ -69,9 +69,16 @@ const READ: [&str; 50] = [
     "wrench_trans",
 ];
 
-/// True for the name of a function that may move the robot; `remove` does not.
+/// Beginnings and ends of names of functions that set or read something of a motion.
+const OF_SETTINGS: [&str; 3] = ["set_", "get_", "is_"];
+const SETTINGS: [&str; 8] = ["acceleration", "average", "gain", "gains", "limit", "limits", "speed", "speeds"];
+
+/// True for the name of a function that may move the robot; `remove` and `set_move_speed` do not.
 fn is_motion(name: &str) -> bool {
     let name = name.to_ascii_lowercase().replace("remov", "");
+    if OF_SETTINGS.iter().any(|begins| name.starts_with(begins)) || SETTINGS.iter().any(|ends| name.ends_with(ends)) {
+        return false;
+    }
     let mut parts = name.split(|c: char| !c.is_ascii_alphabetic());
     ["mov", "servo", "ptp"].iter().any(|word| name.contains(word))
         || parts.any(|part| ["lin", "linear"].contains(&part))
@@ -267,7 +274,19 @@ mod tests {
         for name in ["my_movej", "moveh", "doServo", "PTP_fast", "go_lin", "lin2", "linear_to"] {
             assert!(is_motion(name), "{name}");
         }
-        for name in ["remove_item", "polyline", "cooling", "set_limits"] {
+        for name in [
+            "remove_item",
+            "polyline",
+            "cooling",
+            "set_limits",
+            "set_move_speed",
+            "set_moving_average",
+            "get_moved_joints",
+            "is_moving",
+            "servo_gains",
+            "servoSpeed",
+            "moving_average",
+        ] {
             assert!(!is_motion(name), "{name}");
         }
     }
