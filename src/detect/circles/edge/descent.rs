@@ -8,12 +8,10 @@ use super::normal::{Normal, cholesky, solve};
 use super::prior::Prior;
 use super::squares::Squares;
 use super::start::{Descent, Start};
-use super::state::{ANNULUS, DARK, INNER, LN_BLUR, LN_RATIO, SHAPE, State, THIRD, WHITE};
+use super::state::{ANNULUS, DARK, INNER, LN_BLUR, LN_RATIO, LONGEST_LN_RATIO, SHAPE, State, THIRD, WHITE};
 use crate::detect::circles::types::Reason;
 
 const ITERATIONS: usize = 14;
-/// Longest step of the logarithm of the radius ratio.
-const LONGEST_LN_RATIO: f64 = 0.2;
 /// Damped steps at most, how often what the closed form misses is taken, and the damping after the first step that is refused and beyond which none is tried.
 const DAMPED_STEPS: usize = 40;
 const CORRECTIONS: usize = 3;
@@ -28,7 +26,7 @@ pub(super) fn iterate(state: &mut State, prior: &Prior, start: &Start, pixels: &
     let parameters = state.parameters();
     let mut travelled = match start.descent {
         Descent::Whole => [0.0; ANNULUS],
-        Descent::Damped => approach(state, prior, start, pixels).ok_or(Reason::NoConvergence)?,
+        Descent::Damped => approach(state, prior, start, pixels),
     };
     let mut factor: Normal = [[0.0; ANNULUS]; ANNULUS];
     let mut last = f64::MAX;
@@ -115,40 +113,38 @@ impl Point {
     }
 }
 
-/// Damped steps (Levenberg and Marquardt) to near the least cost; what was travelled, or nothing for equations without a solution.
+/// Damped steps (Levenberg and Marquardt) to near the least cost; what was travelled.
 ///
 /// Paper and ink have one noise here: weights that depend on the state lead to another place than that of the least cost. What the closed form
 /// misses moves the levels of a thin ring far: it is taken after the first steps, and again after those that follow.
-fn approach(state: &mut State, prior: &Prior, start: &Start, pixels: &mut Pixels) -> Option<[f64; ANNULUS]> {
+fn approach(state: &mut State, prior: &Prior, start: &Start, pixels: &mut Pixels) -> [f64; ANNULUS] {
     let noise = [0.5 * (start.noise[0] + start.noise[1]); 2];
     let mut point = Point::at(*state, [0.0; ANNULUS], prior, noise, pixels);
     for _ in 0..CORRECTIONS {
-        point = descend(point, prior, (start, noise), pixels)?;
+        point = descend(point, prior, (start, noise), pixels);
         if !pixels.correct(&point.state) {
             break;
         }
         point = Point::at(point.state, point.travelled, prior, noise, pixels);
     }
     *state = point.state;
-    Some(point.travelled)
+    point.travelled
 }
 
 /// From a point at which the pixels are evaluated.
-fn descend(from: Point, prior: &Prior, (start, noise): (&Start, [f64; 2]), pixels: &mut Pixels) -> Option<Point> {
+fn descend(from: Point, prior: &Prior, (start, noise): (&Start, [f64; 2]), pixels: &mut Pixels) -> Point {
     let (parameters, size) = (from.state.parameters(), start.ellipse.semi_axes()[0]);
     let (mut point, mut damping) = (from, 0.0);
     for _ in 0..DAMPED_STEPS {
         let equations = point.equations(prior, noise, pixels);
         let mut taken = None;
         while taken.is_none() && damping <= MOST_DAMPING {
-            let delta = damped(&equations, parameters, damping, |delta| limit(delta, size, start))?;
-            let trial = point.moved(&delta, prior, noise, pixels);
-            if trial.cost <= point.cost && !out_of_bounds(&trial.state, &trial.travelled, size) {
-                damping *= 0.1;
-                taken = Some((trial, delta));
-            } else {
-                damping = f64::max(10.0 * damping, FIRST_DAMPING);
-            }
+            let delta = damped(&equations, parameters, damping, |delta| limit(delta, size, start));
+            let trial = delta.map(|delta| (point.moved(&delta, prior, noise, pixels), delta));
+            let is_better =
+                |(to, _): &(Point, _)| to.cost <= point.cost && !out_of_bounds(&to.state, &to.travelled, size);
+            taken = trial.filter(is_better);
+            damping = if taken.is_some() { 0.1 * damping } else { f64::max(10.0 * damping, FIRST_DAMPING) };
         }
         let Some((next, delta)) = taken else { break };
         let gain = point.cost - next.cost;
@@ -157,10 +153,10 @@ fn descend(from: Point, prior: &Prior, (start, noise): (&Start, [f64; 2]), pixel
             break;
         }
     }
-    Some(point)
+    point
 }
 
-/// The step of damped equations, shortened to what a state takes as a whole.
+/// The step of damped equations, shortened to what a state takes as a whole; `None` where they have no solution.
 fn damped(
     (normal, right): &(Normal, [f64; ANNULUS]),
     parameters: usize,

@@ -17,6 +17,9 @@ pub(super) const DARK: usize = 11;
 pub(super) const INNER: usize = 14;
 pub(super) const LN_RATIO: usize = 16;
 
+/// Longest step of the logarithm of the radius ratio.
+pub(super) const LONGEST_LN_RATIO: f64 = 0.2;
+
 /// State of the model; positions are relative to an anchor pixel.
 #[derive(Debug, Clone, Copy)]
 pub struct State {
@@ -53,7 +56,7 @@ impl State {
         (0..3).for_each(|a| self.dark[a] += delta[DARK + a]);
         if let Some((centre, ratio)) = &mut self.inner {
             (0..2).for_each(|a| centre[a] += delta[INNER + a]);
-            *ratio *= delta[LN_RATIO].clamp(-0.2, 0.2).exp();
+            *ratio *= delta[LN_RATIO].clamp(-LONGEST_LN_RATIO, LONGEST_LN_RATIO).exp();
         }
     }
 
