@@ -122,7 +122,8 @@ fn plain_variance(fits: &[Fit], side: usize) -> Option<f64> {
 
 /// Measures every candidate of a picture without asking which marker it is.
 ///
-/// For plates without a code and for judging the image stage alone. Returns the markers in the order of the scan and
+/// For plates without a code and for judging the image stage alone. Nothing says which candidates are markers: one that whole steps do not reach
+/// is dropped, as damped steps for all letters of a text would take several times as long. Returns the markers in the order of the scan and
 /// the candidates that were dropped.
 pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<DroppedCandidate>) {
     let levels = Levels::of(picture, largest_marker(picture, options), THRESHOLD);
@@ -135,7 +136,7 @@ pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Drop
     let camera = learn(picture, &mut targets, guess, levels.noise, &mut pixels);
     let mut measured = Vec::new();
     for target in &targets {
-        match refine_steadily(picture, &target.start(&camera, 0.3), &mut pixels) {
+        match refine(picture, &target.start(&camera, 0.3), &mut pixels) {
             Ok(fit) => measured.push(fit.measured),
             Err(reason) => dropped.push(drop_target(target, reason, None)),
         }
