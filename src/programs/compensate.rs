@@ -248,7 +248,7 @@ impl<'a> Work<'a> {
             _ => None,
         };
         let (programmed_before, corrected_before) = before.unzip();
-        let Meant { kind, readings: programmed, held, known } = meant;
+        let Meant { kind, readings: programmed, held, known, .. } = meant;
         let kind = &kind;
         let meant = reach(self.models.from, &self.limits, &held, programmed_before.as_deref()).stop(&programmed);
         let moved = self.frames.as_ref().map_or_else(|| Ok(Moved::none()), |f| f.moved(kind))?;

@@ -17,6 +17,8 @@ pub(super) struct Meant {
     pub kind: TargetKind,
     /// Its readings, rad or m.
     pub readings: Vec<f64>,
+    /// False for readings of which the text does not tell where they stand.
+    told: Vec<bool>,
     /// True for readings that keep their value.
     pub held: Vec<bool>,
     /// How its posture is known.
@@ -52,6 +54,17 @@ pub(super) fn meant(
 
 fn unreached() -> Why {
     Why::new(LeftReason::PostureUnknown, "its posture is not known: nothing leads to it")
+}
+
+/// Which readings of a target the text tells, be it with the target before.
+fn told(kind: &TargetKind, readings: usize, before: Option<&Meant>) -> Vec<bool> {
+    match kind {
+        TargetKind::Joints(joints) => {
+            let own = joints.readings.iter().enumerate();
+            own.map(|(i, q)| q.is_finite() || before.is_some_and(|b| b.told[i])).collect()
+        }
+        TargetKind::Pose(_) => vec![true; readings],
+    }
 }
 
 fn arrivals(target: &Target) -> Vec<Arrival> {
@@ -184,30 +197,32 @@ impl Meaning<'_> {
     /// What a target means to a robot that comes from there.
     fn by(&mut self, k: usize, n: usize, origin: Approach) -> Understood<Meant> {
         let before = origin.target().and_then(|j| match &self.found[j] {
-            Found::Meant(meant, _) => Some(meant.readings.clone()),
+            Found::Meant(meant, _) => Some(&**meant),
             _ => None,
         });
         let straight = matches!(origin, Approach::From(_));
-        let kind = self.completed(&self.targets[k], before.as_deref().filter(|_| straight))?;
+        let kept = before.filter(|_| straight);
+        let kind = self.completed(&self.targets[k], kept)?;
+        let told = told(&self.targets[k].kind, self.held.len(), kept);
         let held = |own: Vec<bool>| own.iter().zip(self.held).map(|(a, h)| *a || *h).collect::<Vec<bool>>();
         match &kind {
             TargetKind::Joints(joints) => {
                 let held = held(joints.fields.iter().map(Option::is_none).collect());
                 let readings = joints.readings.clone();
-                Ok(Meant { kind, readings, held, known: Known::Joints })
+                Ok(Meant { kind, readings, told, held, known: Known::Joints })
             }
             TargetKind::Pose(pose) => {
                 let held = held(pose.fixed.iter().map(Option::is_some).collect());
                 let aimed = PoseTarget { posture: self.arrivals[k][n].posture.clone(), ..(**pose).clone() };
-                let before = Before { readings: before.as_deref(), straight };
+                let before = Before { readings: before.map(|b| &b.readings[..]), straight };
                 let (readings, known) = self.finder.joints(&aimed, &held, before)?;
-                Ok(Meant { kind, readings, held, known })
+                Ok(Meant { kind, readings, told, held, known })
             }
         }
     }
 
     /// The target with what its text leaves out, which is what the target before it says.
-    fn completed(&self, target: &Target, before: Option<&[f64]>) -> Understood<TargetKind> {
+    fn completed(&self, target: &Target, before: Option<&Meant>) -> Understood<TargetKind> {
         let unknown =
             || Why::new(LeftReason::Incomplete, "it leaves numbers out, and the target before it is not known");
         let mut kind = target.kind.clone();
@@ -215,7 +230,7 @@ impl Meaning<'_> {
             TargetKind::Joints(joints) => {
                 for (i, q) in joints.readings.iter_mut().enumerate().filter(|(_, q)| !q.is_finite()) {
                     // Axes that the target does not have keep their place, wherever that is.
-                    let known = before.map(|b| b[i]);
+                    let known = before.map(|b| b.readings[i]);
                     *q = match joints.fields[i] {
                         None => known.unwrap_or_else(|| self.finder.anywhere(i)),
                         Some(_) => known.ok_or_else(unknown)?,
@@ -223,7 +238,13 @@ impl Meaning<'_> {
                 }
             }
             TargetKind::Pose(pose) if pose.is_partial() => {
-                pose.complete(&self.controller.base_from_tip(before.ok_or_else(unknown)?));
+                let before = before.ok_or_else(unknown)?;
+                for (i, place) in pose.fixed.iter_mut().enumerate() {
+                    if place.is_some_and(|value| !value.is_finite()) {
+                        *place = Some(before.told[i].then_some(before.readings[i]).ok_or_else(unknown)?);
+                    }
+                }
+                pose.complete(&self.controller.base_from_tip(&before.readings));
             }
             TargetKind::Pose(_) => {}
         }

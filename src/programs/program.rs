@@ -215,7 +215,7 @@ pub struct PoseTarget {
     pub base_from_work: Pose,
     /// `flange_from_tool`.
     pub flange_from_tool: Pose,
-    /// Values of the axes that the target fixes beside the pose (external axes), by reading.
+    /// Values of the axes that the target fixes beside the pose (external axes), by reading; not finite where the text leaves one out.
     pub fixed: Vec<Option<f64>>,
     /// Which of the postures that reach the pose is meant.
     pub posture: MeantPosture,
@@ -328,7 +328,7 @@ impl PoseTarget {
         self.base_from_work * self.work_from_tool() * self.flange_from_tool.inverse()
     }
 
-    /// Fills numbers that the text leaves out (not finite so far) with those of the pose before.
+    /// Fills numbers of the pose that the text leaves out (not finite so far) with those of the pose before.
     pub(super) fn complete(&mut self, base_from_flange: &Pose) {
         let before = self.base_from_work.inverse() * *base_from_flange * self.flange_from_tool;
         let fill = |field: &mut Field, value: f64| {
@@ -349,7 +349,8 @@ impl PoseTarget {
             RotationFields::Abc(f) | RotationFields::Vector(f) => &f[..],
             RotationFields::Quaternion(f) => &f[..],
         };
-        self.position.iter().chain(rotation).any(|f| !f.written.is_finite())
+        let leaves_axes = self.fixed.iter().flatten().any(|place| !place.is_finite());
+        leaves_axes || self.position.iter().chain(rotation).any(|f| !f.written.is_finite())
     }
 
     /// The point that the fields say, in the work object.

@@ -94,9 +94,8 @@ fn a_target_with_aligned_wrist_axes_is_singular_wherever_the_cell_stands() {
     }
 }
 
-/// A rail under the arm keeps its place: the arm alone makes up for what is wrong, with axis angles as with poses.
-#[test]
-fn external_axes_keep_their_value_beside_axis_angles() {
+/// An arm on a rail, and the same one slightly wrong.
+fn on_rail() -> (Chain, Robot) {
     let folder = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(kr6_urdf()).unwrap();
     let rail = "<link name=\"rail\"/><joint name=\"slide\" type=\"prismatic\"><parent link=\"rail\"/><child link=\"base_link\"/>\
@@ -109,6 +108,13 @@ fn external_axes_keep_their_value_beside_axis_angles() {
         let twist = Vector6::from_fn(|i, _| 1e-3 * ((3 * k + i) as f64).sin());
         joint.origin = joint.origin.perturbed(&twist);
     }
+    (chain, real)
+}
+
+/// A rail under the arm keeps its place: the arm alone makes up for what is wrong, with axis angles as with poses.
+#[test]
+fn external_axes_keep_their_value_beside_axis_angles() {
+    let (chain, real) = on_rail();
     let degrees = [12.0, -60.0, 80.0, 20.0, 50.0, 10.0];
     let axes = degrees.iter().enumerate().map(|(k, v)| format!("A{} {v:.1}", k + 1)).collect::<Vec<_>>().join(",");
     let krl = format!("DEF a()\nPTP {{E6AXIS: {axes},E1 500.0}}\nPTP {{E1 700.0}}\nEND\n");
@@ -124,5 +130,44 @@ fn external_axes_keep_their_value_beside_axis_angles() {
         assert_eq!(correction.corrected[0], 0.5, "{name}");
         assert!(new.contains(kept), "{new}");
         assert!(name != "a.src" || new.contains("PTP {E1 700.0}"), "{new}");
+    }
+}
+
+/// A pose without its external axis: the rail stands where the target before has left it, and no other place may be taken for it.
+#[test]
+fn a_pose_that_leaves_the_rail_out_keeps_it_where_it_stands() {
+    let (chain, real) = on_rail();
+    let nominal = Robot::nominal(chain.clone());
+    let degrees = [12.5, -59.0, 79.0, 20.5, 50.5, 10.5f64];
+    let meant: Vec<f64> = std::iter::once(0.5).chain(degrees.map(f64::to_radians)).collect();
+    let pose = nominal.base_from_tip(&meant);
+    let [x, y, z] = pose.xyz().map(|v| 1e3 * v);
+    let [c, b, a] = pose.rpy().map(f64::to_degrees);
+    let lin = format!("LIN {{X {x:.7},Y {y:.7},Z {z:.7},A {a:.8},B {b:.8},C {c:.8}}}\n");
+    let begin = "DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n";
+    let arm = "A1 12.0,A2 -60.0,A3 80.0,A4 20.0,A5 50.0,A6 10.0";
+    // One after another: what the first of them leaves out is known too.
+    let text = format!("{begin}PTP {{{arm},E1 500.0}}\n{lin}{lin}END\n");
+    let (done, _) = outcomes("a.src", text, &real, &chain, None);
+    assert_eq!(done.len(), 3);
+    for outcome in &done[1..] {
+        let TargetOutcome::Done(correction) = outcome else { panic!("{outcome:?}") };
+        for (found, q) in correction.programmed.iter().zip(&meant) {
+            assert!((found - q).abs() < 1e-6, "{:?}", correction.programmed);
+        }
+        assert!((correction.corrected[0] - 0.5).abs() < 1e-12, "{:?}", correction.corrected);
+        assert_meets(&real.base_from_tip(&correction.corrected), &pose, "the rail stands");
+    }
+    let moved_beside = format!("{begin}PTP {{{arm},E1 500.0}}\nPTP {{E1 700.0}}\n{lin}END\n");
+    let nowhere_told = format!("{begin}PTP {{{arm}}}\n{lin}END\n");
+    let (none, at) = ([9e9; 6], [x, y, z]);
+    let quaternion = "[0.0,1.0,0.0,0.0]";
+    let first = format!(
+        "MODULE m\nPROC main()\nMoveL [{at:?},{quaternion},[0,0,0,0],{none:?}],v10,fine,tool0;\nENDPROC\nENDMODULE\n"
+    );
+    for (name, text) in [("a.src", moved_beside), ("a.src", nowhere_told), ("m.mod", first)] {
+        let (left, _) = outcomes(name, text.clone(), &real, &chain, None);
+        let Some(TargetOutcome::Left(why)) = left.last() else { panic!("{text}: {left:?}") };
+        assert_eq!(why.reason, LeftReason::Incomplete, "{text}: {}", why.words);
     }
 }

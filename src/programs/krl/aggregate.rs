@@ -180,12 +180,11 @@ impl Aggregate {
         self.elements.iter().filter_map(move |(name, element)| Some((external_axis(name)?, place(element))))
     }
 
-    /// Values of the external axes by reading; `None` for the others and for those that are missing.
+    /// Values of the external axes by reading, not finite for those that are missing; `None` for the others.
     pub fn external(&self, axes: &[usize], prismatic: &[bool]) -> Vec<Option<f64>> {
         let mut fixed = vec![None; axes.len()];
         for (k, &reading) in axes.iter().enumerate().skip(6) {
-            let value = self.axis_field(k, prismatic[reading]).1.value();
-            fixed[reading] = value.is_finite().then_some(value);
+            fixed[reading] = Some(self.axis_field(k, prismatic[reading]).1.value());
         }
         fixed
     }

@@ -406,7 +406,7 @@ impl Task<'_> {
         }
         let mut fixed = vec![None; axes.len()];
         for (&reading, (value, _)) in axes.iter().skip(6).zip(&external) {
-            fixed[reading] = (*value < NO_AXIS).then_some(value * self.unit(reading).0);
+            fixed[reading] = Some(if *value < NO_AXIS { value * self.unit(reading).0 } else { f64::NAN });
         }
         Ok(TargetKind::Pose(Box::new(PoseTarget {
             position: trans.map(|t| field(t, 1e-3, DECIMALS_MM)),
