@@ -18,9 +18,10 @@ use crate::files;
 use crate::geom::Pose;
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
-use crate::output::corrections::{self, FileFinding, TABLE};
+use crate::output::corrections::{self, FileFinding, Meant, TABLE};
 use crate::output::written_programs::WrittenProgram;
 use crate::output::{ResultFolder, compensated};
+use crate::programs::compensate::Compensated;
 use crate::programs::{
     self, Correction, Language, Left, Models, Postures, Program, ProgramSetting, Target, TargetKind, TargetOutcome,
     TextFile,
@@ -133,14 +134,7 @@ enum Unit {
 
 pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     let place = ResultFolder::among(&args.out)?;
-    let robot = |file: &Path, compensation: Option<&PathBuf>| -> Result<Robot> {
-        let description = urdf::read(file)?;
-        let base = stands_on(args, &description).map(|(link, _)| link).or(args.base.as_deref());
-        let chain = noted_chain(&description, base, args.tip.as_deref())?;
-        let mut robot = compensated(chain, compensation.map(PathBuf::as_path))?;
-        robot.terms.retain(|t| !args.unordered || t.term != Term::Backlash);
-        Ok(robot)
-    };
+    let robot = |file: &Path, compensation: Option<&PathBuf>| robot(args, file, compensation.map(PathBuf::as_path));
     let nominal = args.nominal.as_ref().or(args.from.as_ref()).unwrap_or(&args.urdf);
     let controller = robot(nominal, None)?;
     let to = robot(&args.urdf, args.compensation.as_ref())?;
@@ -154,23 +148,9 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<Vec<_>>>()?;
     let language = language(args)?;
     files.iter().try_for_each(is_text)?;
-    let setting = ProgramSetting {
-        chain: &controller.chain,
-        axes: &axes,
-        rad_per_unit: args.joint_unit.map(|u| if u == Unit::Deg { 1f64.to_radians() } else { 1.0 }),
-        base: stands_on(args, &urdf::read(nominal)?).map_or_else(Pose::identity, |(_, pose)| pose),
-        tool: frame("--tool", args.tool.as_deref(), language)?,
-        work: frame("--work", args.work.as_deref(), language)?,
-        axes_apart: args.axes_apart,
-    };
+    let setting = setting(args, nominal, &controller.chain, &axes, language)?;
     let mut program = programs::read(language, files, &setting)?;
-    let needs_controller =
-        |t: &&Target| matches!(&t.kind, TargetKind::Pose(p) if p.joint_fields.iter().all(Option::is_none));
-    if let (None, Some(t)) = (&args.nominal, program.targets.iter().find(needs_controller)) {
-        let place = format!("{}:{} {}", program.files[t.file].name, t.line, t.name);
-        let what = "is a pose, which the controller turns into joints by its own model";
-        return Err(Error::new(Code::ProgramModelMissing, place, what, "give that model with --nominal"));
-    }
+    poses_have_model(args, &program)?;
     if args.nearest_posture {
         program.heed_no_codes();
     }
@@ -212,6 +192,74 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     findings.extend(corrections::left_finding(&left, &subject));
     findings.extend(corrections::missing_finding(&program, &left, &subject));
     let report = corrections::table(&program, &done, expected.as_deref().ok(), &controller.chain);
+    let written = write(args, &place, &program, &done, &findings, &report)?;
+    say!("{}", text(&program, &done.outcomes, &left, &controller.chain));
+    // Targets that are left are listed already.
+    say::findings(findings.iter().filter(|f| f.code != Code::TargetsLeft));
+    let verdict = verdict(&left, &findings, &meant);
+    say_line!("results   {} ({} files)", args.out.display(), written);
+    Ok(verdict)
+}
+
+/// How the program is read.
+fn setting<'a>(
+    args: &CompensateArgs,
+    nominal: &Path,
+    chain: &'a Chain,
+    axes: &'a [usize],
+    language: Language,
+) -> Result<ProgramSetting<'a>> {
+    Ok(ProgramSetting {
+        chain,
+        axes,
+        rad_per_unit: args.joint_unit.map(|u| if u == Unit::Deg { 1f64.to_radians() } else { 1.0 }),
+        base: stands_on(args, &urdf::read(nominal)?).map_or_else(Pose::identity, |(_, pose)| pose),
+        tool: frame("--tool", args.tool.as_deref(), language)?,
+        work: frame("--work", args.work.as_deref(), language)?,
+        axes_apart: args.axes_apart,
+    })
+}
+
+/// Says whether all was corrected.
+fn verdict(left: &[Left], findings: &[FileFinding], meant: &Meant) -> Verdict {
+    let good = left.is_empty() && findings.iter().all(|f| f.weight == Weight::Note);
+    let gates: Vec<&str> = findings.iter().filter(|f| f.weight == Weight::Gate).map(|f| f.code.name()).collect();
+    match good {
+        true => say_line!("verdict   corrected{}", meant.in_words()),
+        false => say_line!("verdict   NOT CORRECTED AS A WHOLE: {}", gates.join(", ")),
+    }
+    if good { Verdict::Good } else { Verdict::GateFailed }
+}
+
+/// A robot as its files describe it.
+fn robot(args: &CompensateArgs, file: &Path, compensation: Option<&Path>) -> Result<Robot> {
+    let description = urdf::read(file)?;
+    let base = stands_on(args, &description).map(|(link, _)| link).or(args.base.as_deref());
+    let chain = noted_chain(&description, base, args.tip.as_deref())?;
+    let mut robot = compensated(chain, compensation)?;
+    robot.terms.retain(|t| !args.unordered || t.term != Term::Backlash);
+    Ok(robot)
+}
+
+/// Poses are turned into joints by the model of the controller, which must be given for them.
+fn poses_have_model(args: &CompensateArgs, program: &Program) -> Result<()> {
+    let needs_controller =
+        |t: &&Target| matches!(&t.kind, TargetKind::Pose(p) if p.joint_fields.iter().all(Option::is_none));
+    let (None, Some(t)) = (&args.nominal, program.targets.iter().find(needs_controller)) else { return Ok(()) };
+    let place = format!("{}:{} {}", program.files[t.file].name, t.line, t.name);
+    let what = "is a pose, which the controller turns into joints by its own model";
+    Err(Error::new(Code::ProgramModelMissing, place, what, "give that model with --nominal"))
+}
+
+/// Writes the programs, the table and the findings; says how many files these are.
+fn write(
+    args: &CompensateArgs,
+    place: &ResultFolder,
+    program: &Program,
+    done: &Compensated,
+    findings: &[FileFinding],
+    report: &str,
+) -> Result<usize> {
     let mut written: Vec<(String, &[u8])> = Vec::new();
     for (path, bytes) in args.programs.iter().zip(&done.files) {
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
@@ -220,21 +268,11 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     let is_changed = |(file, new): &(&TextFile, &(String, &[u8]))| file.bytes != new.1;
     let changed = program.files.iter().zip(&written).filter(is_changed);
     let records: Vec<_> = changed.map(|(_, (name, bytes))| WrittenProgram::new(name, bytes)).collect();
-    let said = corrections::findings_json(&findings, &records)?;
+    let said = corrections::findings_json(findings, &records)?;
     written.push((corrections::TABLE.to_owned(), report.as_bytes()));
     written.push((corrections::FINDINGS.to_owned(), said.as_bytes()));
     place.write_beside(&written, &args.programs)?;
-    say!("{}", text(&program, &done.outcomes, &left, &controller.chain));
-    // Targets that are left are listed already.
-    say::findings(findings.iter().filter(|f| f.code != Code::TargetsLeft));
-    let good = left.is_empty() && findings.iter().all(|f| f.weight == Weight::Note);
-    let gates: Vec<&str> = findings.iter().filter(|f| f.weight == Weight::Gate).map(|f| f.code.name()).collect();
-    match good {
-        true => say_line!("verdict   corrected{}", meant.in_words()),
-        false => say_line!("verdict   NOT CORRECTED AS A WHOLE: {}", gates.join(", ")),
-    }
-    say_line!("results   {} ({} files)", args.out.display(), written.len());
-    Ok(if good { Verdict::Good } else { Verdict::GateFailed })
+    Ok(written.len())
 }
 
 /// Whether the descriptions are those that were meant.
