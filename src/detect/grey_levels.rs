@@ -6,66 +6,55 @@
 //! so that a corner or a centre has `1 / ((L - 1) sqrt(12 ALONG))` px per axis: 0.1 px for one bit. No residual tells of that: the fit sees a
 //! sharp picture.
 
-use std::collections::BTreeSet;
-
-use super::{Detection, Picture};
+use super::Detection;
 use crate::error::{Code, Notice};
 
-/// A picture with as many levels has blurred edges.
-const ENOUGH: usize = 8;
 /// Pixels along an edge whose errors count as independent.
 const ALONG: f64 = 8.0;
-
-/// Number of grey levels of a picture that has too few.
-pub fn few_levels(picture: &Picture) -> Option<usize> {
-    let mut seen = BTreeSet::new();
-    let mut last = None;
-    for value in picture.pixels.iter().map(|v| v.to_bits()) {
-        if last != Some(value) && seen.insert(value) && seen.len() >= ENOUGH {
-            return None;
-        }
-        last = Some(value);
-    }
-    (seen.len() > 1).then_some(seen.len())
-}
 
 /// Standard deviation of a point per axis by the rounding to so many levels, px.
 fn rounding_px(levels: usize) -> f64 {
     1.0 / ((levels as f64 - 1.0) * (12.0 * ALONG).sqrt())
 }
 
-/// Adds the rounding to the covariances, and says so where anything was found.
-pub fn allow_for_rounding(detection: &mut Detection, levels: usize) {
+/// Adds the rounding to the covariances of the markers that are `new` (by id).
+pub fn allow_for_rounding(detection: &mut Detection, levels: usize, new: impl Fn(u32) -> bool) {
     let sigma_px = rounding_px(levels);
     let variance = sigma_px * sigma_px;
-    for observation in &mut detection.observations {
+    for observation in detection.observations.iter_mut().filter(|o| new(o.marker)) {
         observation.covariance = observation.covariance.map(|[uu, uv, vv]| [uu + variance, uv, vv + variance]);
     }
-    let found = detection.circles.iter_mut().flat_map(|c| &mut c.found);
+    let found = detection.circles.iter_mut().flat_map(|c| &mut c.found).filter(|f| new(f.marker));
     found.for_each(|f| f.measured.widen(1.0, sigma_px));
-    if !detection.observations.is_empty() {
-        let what = format!(
-            "it has {levels} grey levels: points are known to {sigma_px:.2} px, as edges jump from pixel to pixel"
-        );
-        let remedy = "store images in grey levels (8 bits or more), without a threshold";
-        detection.notices.push(Notice::new(Code::FewGreyLevels, "image", what, remedy));
-    }
+}
+
+/// What is said of them where anything was found.
+pub fn few_grey_levels(detection: &Detection, levels: usize) -> Option<Notice> {
+    let sigma_px = rounding_px(levels);
+    let what =
+        format!("it has {levels} grey levels: points are known to {sigma_px:.2} px, as edges jump from pixel to pixel");
+    let remedy = "store images in grey levels (8 bits or more), without a threshold";
+    (!detection.observations.is_empty()).then(|| Notice::new(Code::FewGreyLevels, "image", what, remedy))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::series::{Edge, Observation};
 
     #[test]
-    fn levels_are_counted_up_to_enough() {
-        let of = |levels: u32| Picture {
-            width: 40,
-            height: 2,
-            pixels: (0..80).map(|k| (k % levels * 30) as f32).collect(),
-            full_scale: 255.0,
-        };
-        assert_eq!([1, 2, 7, 8].map(|n| few_levels(&of(n))), [None, Some(2), Some(7), None]);
+    fn rounding_is_that_of_eight_pixels_and_all_steps() {
         // 0.29 px over the root of eight.
         assert!((rounding_px(2) - 0.1021).abs() < 1e-4 && (rounding_px(5) - 0.0255).abs() < 1e-4);
+    }
+
+    #[test]
+    fn what_a_second_look_adds_is_widened_and_what_was_known_is_not_again() {
+        let of = |marker| Observation { marker, edge: Edge::Outer, uv: [0.0; 2], covariance: Some([0.01, 0.0, 0.01]) };
+        let mut detection = Detection { observations: vec![of(1), of(2)], ..Detection::default() };
+        allow_for_rounding(&mut detection, 2, |marker| marker == 2);
+        let variances: Vec<f64> = detection.observations.iter().map(|o| o.covariance.unwrap()[0]).collect();
+        // 1 / 96 px^2 for one bit.
+        assert!(variances[0] == 0.01 && (variances[1] - 0.01 - 1.0 / 96.0).abs() < 1e-12, "{variances:?}");
     }
 }

@@ -29,9 +29,12 @@ pub use pictures::load::{load, load_bytes};
 pub use pictures::picture::Picture;
 pub use run::{SeriesImage, detect_series};
 
+use std::collections::BTreeSet;
+
 use crate::error::{Code, Error, Result};
 use crate::series::{Plate, PlateKind};
-use grey_levels::{allow_for_rounding, few_levels};
+use grey_levels::{allow_for_rounding, few_grey_levels};
+use pictures::few_levels::few_levels;
 use pictures::hot_pixels::{hot_pixels, without_hot_pixels};
 
 /// Finds and identifies the markers of a plate in a picture.
@@ -52,15 +55,35 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
 
 /// As [`detect`], but a picture in which nothing can be identified still says what was seen: see [`Detection::failure`].
 pub fn examine(picture: &Picture, plate: &Plate) -> Detection {
-    let mended = without_hot_pixels(picture);
+    let levels = few_levels(picture);
+    let mended = mended(picture, levels);
     let looked_at = mended.as_ref().map_or(picture, |(mended, _)| mended);
     let mut detection =
         by_kind(looked_at, plate).unwrap_or_else(|error| Detection { failure: Some(error), ..Detection::default() });
-    if let Some(levels) = few_levels(picture) {
-        allow_for_rounding(&mut detection, levels);
+    if let Some(levels) = levels {
+        allow_for_rounding(&mut detection, levels, |_| true);
+        let said = few_grey_levels(&detection, levels);
+        detection.notices.extend(said);
     }
     detection.notices.extend(mended.map(|(_, count)| hot_pixels(count)));
     detection
+}
+
+/// Looks once more in a picture that was examined, for the markers that are predicted and were not found: see [`circles::detect_predicted`].
+pub fn examine_predicted(picture: &Picture, detection: &mut Detection, predicted: &[circles::Predicted]) {
+    let levels = few_levels(picture);
+    let mended = mended(picture, levels);
+    let looked_at = mended.as_ref().map_or(picture, |(mended, _)| mended);
+    let known: BTreeSet<u32> = detection.observations.iter().map(|o| o.marker).collect();
+    circles::detect_predicted(looked_at, detection, predicted);
+    if let Some(levels) = levels {
+        allow_for_rounding(detection, levels, |marker| !known.contains(&marker));
+    }
+}
+
+/// The picture without its hot pixels, and how many they were; in one of few grey levels they are no such, but specks of its threshold.
+fn mended(picture: &Picture, levels: Option<usize>) -> Option<(Picture, usize)> {
+    levels.map_or_else(|| without_hot_pixels(picture), |_| None)
 }
 
 fn by_kind(picture: &Picture, plate: &Plate) -> Result<Detection> {

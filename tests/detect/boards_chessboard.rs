@@ -113,9 +113,14 @@ fn corners_of_one_bit_are_as_uncertain_as_their_rounding() {
         let scene = tilted(9, 6, 0.4 + f64::from(step));
         let mut picture = scene.render(0);
         picture.pixels.iter_mut().for_each(|v| *v = if *v < 110.0 { 0.0 } else { 255.0 });
+        // One stray level, and specks beside the board: still one bit, and nothing hot or dead.
+        picture.pixels[5] = 128.0;
+        (0..20).for_each(|k| picture.pixels[640 * (20 + 20 * k) + 10] = 0.0);
+        (0..20).for_each(|k| picture.pixels[640 * (20 + 20 * k) + 30] = 0.0);
         let detection = detect(&picture, &plate(9, 6)).unwrap();
         assert!(detection.observations.len() >= 50, "step {step}: {:?}", detection.dropped);
         assert!(detection.notices.iter().any(|n| n.code == Code::FewGreyLevels), "{:?}", detection.notices);
+        assert!(detection.notices.iter().all(|n| n.code != Code::HotPixels), "{:?}", detection.notices);
         for (o, e) in detection.observations.iter().zip(errors(&detection, |id| scene.corner(id))) {
             // Eight pixels of an edge, uniform in each: 0.10 px.
             let [uu, _, vv] = o.covariance.unwrap();

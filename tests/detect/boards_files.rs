@@ -202,6 +202,8 @@ fn flat_field_takes_out_dark_counts_and_vignetting() {
             assert!((x, y) == (1, 1) || error.abs() < 4.0, "{x} {y}: {error}");
         }
     }
+    let two_levels = make(&|x, _| 20_000.0 * (1 + x / 7 % 2) as f32);
+    assert_eq!(field.apply(two_levels.clone()).unwrap(), two_levels, "levels are no measure of the light");
     assert!(FlatField::from_images(&[], &[], None).unwrap().is_none());
     let small = Picture { width: 10, height: 10, pixels: vec![0.0; 100], full_scale: 65535.0 };
     assert_says(&field.apply(small).expect_err("another size"), Code::ImageSizeDiffers, &["60 x 40"]);

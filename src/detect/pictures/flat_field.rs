@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::few_levels::few_levels;
 use super::flat_field_facts::{FlatFieldFacts, Light, block_means, drift};
 use crate::detect::{Picture, load};
 use crate::error::{Code, Error, Result};
@@ -66,7 +67,8 @@ impl FlatField {
     /// Corrects a picture: counts as an evenly sensitive sensor in even light would give.
     ///
     /// Pixels at or beyond saturation are at `full_scale` afterwards, so that detectors still see that they are clipped;
-    /// a pixel without signal takes the mean of its neighbours in the row.
+    /// a pixel without signal takes the mean of its neighbours in the row. A picture of few grey levels stays as it is: they are no measure of the
+    /// light, and their number is to be seen.
     ///
     /// # Errors
     /// A picture of another size or depth than the dark and white images.
@@ -84,6 +86,9 @@ impl FlatField {
                 ),
                 "record dark and white images with the camera and the settings of the series, or remove their folders",
             ));
+        }
+        if few_levels(&picture).is_some() {
+            return Ok(picture);
         }
         let corrected = |k: usize| {
             let (raw, gain) = (picture.pixels[k], self.gain[k]);

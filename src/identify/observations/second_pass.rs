@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series};
 use crate::assess::Limits;
-use crate::detect::Picture;
-use crate::detect::circles::{Predicted, detect_predicted};
+use crate::detect::circles::Predicted;
+use crate::detect::{Picture, examine_predicted};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::identify::photogrammetry::camera_start::CameraStart;
@@ -42,7 +42,7 @@ pub(super) fn second_pass(
         let (Some(pose), Some(path)) = (pose, &image.path) else { return };
         let predicted = predict(&state, &series.plate, image, &pose);
         if let Ok(picture) = picture(path).as_ref() {
-            detect_predicted(picture, &mut image.detection, &predicted);
+            examine_predicted(picture, &mut image.detection, &predicted);
         }
     });
 }
