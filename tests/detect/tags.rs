@@ -191,26 +191,6 @@ fn blurred_tags_in_encoded_light_are_those_of_the_plate() {
     assert!(tally.outward.abs() < 0.1, "{tally:?}");
 }
 
-/// In a highlight the ink is as light as half of the paper: there the encoding displaces a side by less than elsewhere.
-#[test]
-fn a_highlight_in_encoded_light_moves_no_corner() {
-    let highlight = |mut picture: Picture| {
-        let (width, full) = (picture.width, picture.full_scale);
-        for (k, v) in picture.pixels.iter_mut().enumerate() {
-            let [x, y] = [(k % width) as f32 - 700.0, (k / width) as f32 - 512.0];
-            let glare = 0.5 * full * (-0.5 * ((x / 120.0).powi(2) + (y / 90.0).powi(2))).exp();
-            *v = (*v + glare).round().min(full);
-        }
-        encoded(picture)
-    };
-    for text in [APRILGRID, ARUCO] {
-        let tally = run_recorded(text, 0.45, near, highlight);
-        assert_eq!(tally.wrong, 0, "{text}");
-        assert!(tally.found as f64 >= 0.8 * tally.visible as f64, "{text}: {tally:?}");
-        assert!(tally.farthest < 6.0 && tally.normalised < 1.5, "{text}: {tally:?}");
-    }
-}
-
 #[test]
 fn other_plates_and_mirrors_are_no_tags() {
     let look = View { distance_m: 0.7, tilt_deg: 20.0, ..View::default() };

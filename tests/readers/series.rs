@@ -245,15 +245,16 @@ fn readings_are_matched_by_name_in_si() {
     let notices = series.reading_notices(&chain);
     assert_eq!(notices.len(), 1);
     assert_says(&notices[0], Code::JointUnused, &["spare"]);
-    // A rail that the URDF does not have.
-    let files = [
-        ("series.toml", degrees.as_str()),
-        ("joints.csv", "image,j2,x,E1,j1\na.png,90,0.5,0,-45\nb.png,80,0.5,300,-45\n"),
-    ];
-    let of_rail = read(series_with(&[&files[..], &images[..]].concat()).path()).unwrap().reading_notices(&chain);
-    let moves: Vec<_> = of_rail.iter().filter(|n| n.code == Code::JointUnusedMoves).collect();
-    assert_eq!((moves.len(), of_rail.iter().any(|n| n.code == Code::JointUnused)), (1, false), "{of_rail:?}");
-    assert_says(moves[0], Code::JointUnusedMoves, &["E1"]);
+    // A rail that the URDF does not have, and a counter.
+    for (beside, code) in [([300, 0], Code::JointUnusedMoves), ([1, 2], Code::JointUnused)] {
+        let [first, second] = beside;
+        let joints = format!("image,j2,x,beside,j1\na.png,90,0.5,{first},-45\nb.png,80,0.5,{second},-45\n");
+        let files = [("series.toml", degrees.as_str()), ("joints.csv", joints.as_str()), images[0], images[1]];
+        let notices = read(series_with(&files).path()).unwrap().reading_notices(&chain);
+        let codes: Vec<Code> = notices.iter().map(|n| n.code).collect();
+        assert_eq!(codes, [code], "{notices:?}");
+        assert_says(&notices[0], code, &["beside"]);
+    }
     // A joint that moves something beside the chain is another matter than a name that nobody has.
     let with_branch = Chain { beside: vec!["spare".into()], ..chain.clone() };
     let misspelt = joints.replace("spare,", "spare,j_2,").replace("0.5,7,", "0.5,7,8,").replace("b.png,", "b.png,,");
