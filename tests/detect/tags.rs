@@ -52,8 +52,6 @@ struct Tally {
     bias: [f64; 2],
     /// Mean displacement away from the middle of the tag, px per axis.
     outward: f64,
-    /// Largest error over its sigma.
-    farthest: f64,
 }
 
 /// As a camera that is exposed so that the paper is at this multiple of full scale sees a plate.
@@ -105,7 +103,6 @@ fn run_recorded(
             tally.bias[1] += d.y;
             let middle = (0..4).filter_map(|k| image(o.marker / 4 * 4 + k)).sum::<nalgebra::Vector2<f64>>() / 4.0;
             tally.outward += d.dot(&(image(o.marker).unwrap() - middle).normalize()) / 2.0_f64.sqrt();
-            tally.farthest = tally.farthest.max((d.x * d.x / c[0]).max(d.y * d.y / c[2]).sqrt());
         }
     }
     let n = tally.found.max(1) as f64;
