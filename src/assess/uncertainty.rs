@@ -7,9 +7,10 @@ use crate::assess::{
     FlangeErrors, FlangeModel, Identifiability, Limits, NoiseAtStop, WorkspacePoint, clustered_covariance,
     identifiability, urdf_alone, usual_joint_sigma,
 };
+use crate::error::Result;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Noise};
-use crate::solve::{Covariance, Fit, NoiseInformation, NoiseUncertainty, in_frame, noise_information};
+use crate::solve::{Covariance, Fit, InFrame, NoiseInformation, NoiseUncertainty, in_frame, noise_information};
 
 /// Sigmas of a 95 % interval.
 pub const NORMAL_95: f64 = 1.96;
@@ -44,12 +45,16 @@ pub struct Uncertainty {
 
 /// Judges a fit. Its covariance is made larger by what the uncertainty of an estimated joint noise adds, and where the scatter
 /// between images says clearly more than the noise model. What was `told_before` some joint noise was set to none is what is stated.
+/// Beside it the plates in their frames, with that covariance.
+///
+/// # Errors
+/// As [`in_frame`].
 pub fn judge(
     fit: &mut Fit,
     joint_noise_is_estimated: bool,
     told_before: Option<NoiseInformation>,
     limits: &Limits,
-) -> Uncertainty {
+) -> Result<(Uncertainty, InFrame)> {
     let told = if joint_noise_is_estimated { noise_information(fit) } else { None };
     let uncertainty = told.as_ref().and_then(|told| NoiseUncertainty::of(told, fit));
     let clustered = clustered_covariance(fit.linear(), limits).filter(|_| images_know_the_robot(fit));
@@ -80,10 +85,10 @@ pub fn judge(
         found.clustered_sigma = Some(by_clusters);
     }
     let fit = &*fit;
-    found.covariance = with_plates_in_their_frames(fit);
-    found.take_frames_of_plates(&sigmas(&fit.covariance.reduced), &sigmas(&found.covariance));
+    let in_frame = in_frame(fit.linear(), &fit.covariance)?;
+    let stated = in_frame.dense(n);
+    found.take_frames_of_plates(&sigmas(&fit.covariance.reduced), &sigmas(&stated));
     let Adjustment { problem, state } = &fit.adjustment;
-    let stated = std::mem::take(&mut found.covariance);
     let model = FlangeModel::of(&fit.adjustment, &stated, limits);
     let joint_sigma = &usual_joint_sigma(&on_robot_sigmas(problem));
     let shares = shares_of_series(problem);
@@ -96,15 +101,7 @@ pub fn judge(
     found.flange = model.as_ref().and_then(promise);
     found.workspace = model.map(|m| m.workspace()).unwrap_or_default();
     found.covariance = stated;
-    found
-}
-
-/// Covariance of the dense columns with the plates in their frames; as it is where no image defines one, or where a second stage has stated it.
-fn with_plates_in_their_frames(fit: &Fit) -> DMatrix<f64> {
-    let columns = fit.problem.layout.len();
-    let framed = if fit.covariance.is_replaced { None } else { in_frame(fit.linear(), &fit.covariance).ok() };
-    let as_it_is = || fit.covariance.reduced.view((0, 0), (columns, columns)).into_owned();
-    framed.map_or_else(as_it_is, |framed| framed.dense(columns))
+    Ok((found, in_frame))
 }
 
 impl Uncertainty {

@@ -14,7 +14,7 @@ use crate::model::camera::Lens;
 use crate::model::joint_terms::RobotModel;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries};
-use crate::solve::Status;
+use crate::solve::{InFrame, Status};
 
 /// Evidence of a robot model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -61,6 +61,8 @@ pub struct Solution {
     pub series: Vec<MeasuredSeries>,
     /// Identifiability, sigmas by clusters, workspace map.
     pub uncertainty: Uncertainty,
+    /// The plates in the frames that their nominal markers define, with the covariance there.
+    pub in_frame: InFrame,
     /// Evidence of the robot models where the data chose among them.
     pub evidences: Vec<Evidence>,
     /// Evidence of the lenses of cameras whose lens was open.

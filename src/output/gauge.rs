@@ -8,16 +8,17 @@ use nalgebra::{Matrix3, Matrix6};
 use crate::error::Result;
 use crate::fit::Fit;
 use crate::geom::{Pose, adjoint};
-use crate::problem::{Adjustment, PlateShape, Problem};
+use crate::problem::{Adjustment, PlateShape};
 use crate::solve::{InFrame, PlateScale, Similarity, in_frame};
 
 /// Plates, their poses and covariances in the frames of their nominal markers.
 pub(super) struct Gauge {
-    in_frame: InFrame,
     /// Shapes of the plates at their sizes; that of a plate that no image shows as it was.
     pub plates: Vec<PlateShape>,
     /// Poses of the plates: `base_from_plate`, or `flange_from_plate` for a fixed camera.
     pub placements: Vec<Pose>,
+    /// Covariances of these poses.
+    pub placed: Vec<Matrix6<f64>>,
     /// `fitted plate frame <- frame` of every plate and of every placement.
     of_plates: Vec<Pose>,
     of_placements: Vec<Pose>,
@@ -30,12 +31,12 @@ pub(super) struct Gauge {
 }
 
 impl Gauge {
-    /// Of a fit with a robot: plates as large as they were found.
+    /// Of a fit with a robot and its plates in their frames: as large as they were found.
     ///
     /// # Errors
     /// Markers that lie on a line.
-    pub fn of(fit: &Fit) -> Result<Self> {
-        Self::with_sizes(fit, |_, found| found)
+    pub fn of(fit: &Fit, in_frame: &InFrame) -> Result<Self> {
+        Self::with_sizes(fit, in_frame, |_, found| found)
     }
 
     /// Of images alone, which see no size: plates as large as the stand-alone poses are given for.
@@ -44,13 +45,13 @@ impl Gauge {
     /// Markers that lie on a line.
     pub fn of_images(fit: &Fit, scales: &[Option<PlateScale>]) -> Result<Self> {
         let size = |plate: usize, found| scales[plate].map_or(found, |scale| 1.0 + scale.relative);
-        Ok(Self { scales: scales.to_vec(), ..Self::with_sizes(fit, size)? })
+        let in_frame = in_frame(fit.linear(), &fit.covariance)?;
+        Ok(Self { scales: scales.to_vec(), ..Self::with_sizes(fit, &in_frame, size)? })
     }
 
     /// `size` is that of a plate, of which the fit found one.
-    fn with_sizes(fit: &Fit, size: impl Fn(usize, f64) -> f64) -> Result<Self> {
+    fn with_sizes(fit: &Fit, in_frame: &InFrame, size: impl Fn(usize, f64) -> f64) -> Result<Self> {
         let Adjustment { problem, state } = &fit.adjustment;
-        let in_frame = in_frame(fit.linear(), &fit.covariance)?;
         let mut plates = state.plates.clone();
         let mut of_plates = vec![Pose::identity(); plates.len()];
         let (mut scales, mut resized) = (vec![None; plates.len()], vec![1.0; plates.len()]);
@@ -68,24 +69,22 @@ impl Gauge {
         let of_placements: Vec<Pose> =
             plates_of_placements(fit).into_iter().map(|p| p.map_or_else(Pose::identity, |p| of_plates[p])).collect();
         let placements = state.placements.iter().zip(&of_placements).map(|(pose, motion)| *pose * *motion).collect();
+        let placed = problem.layout.placements.iter().zip(&of_placements).map(|(columns, motion)| {
+            let followed = followed(motion);
+            followed * in_frame.placement(columns.start) * followed.transpose()
+        });
+        let placed = placed.collect();
         let mut positions = in_frame.positions(fit);
         for (own, motion) in positions.iter_mut().zip(&of_plates) {
             let turn = motion.rotation.transpose();
             own.iter_mut().for_each(|c| *c = turn * *c * turn.transpose());
         }
-        Ok(Self { in_frame, plates, placements, of_plates, of_placements, resized, positions, scales })
+        Ok(Self { plates, placements, placed, of_plates, of_placements, resized, positions, scales })
     }
 
-    /// Covariance of the pose of a plate.
-    pub fn placement(&self, problem: &Problem, placement: usize) -> Matrix6<f64> {
-        let covariance = self.in_frame.placement(problem.layout.placements[placement].start);
-        let followed = self.followed(placement);
-        followed * covariance * followed.transpose()
-    }
-
-    /// Body twist of the pose of a plate as it is written by that of the fit: that of `T M` is `Ad(M^-1)` times that of `T`.
+    /// Body twist of the pose of a plate as it is written by that of the fit.
     pub fn followed(&self, placement: usize) -> Matrix6<f64> {
-        adjoint(&self.of_placements[placement].inverse())
+        followed(&self.of_placements[placement])
     }
 
     /// `camera_from_plate` of an image, of which the fit has this pose.
@@ -98,6 +97,11 @@ impl Gauge {
         let followed = *fitted * self.of_plates[own.plate];
         Pose::new(followed.rotation, followed.translation * self.resized[own.plate])
     }
+}
+
+/// The body twist of `T M` is `Ad(M^-1)` times that of `T`.
+fn followed(motion: &Pose) -> Matrix6<f64> {
+    adjoint(&motion.inverse())
 }
 
 /// The plate of every placement: that of the images that tie it to the robot, else that of the first image.

@@ -81,7 +81,7 @@ pub fn each_file(
     context: &Context,
     put: &mut impl FnMut(&str, Vec<u8>) -> Result<()>,
 ) -> Result<()> {
-    let gauge = gauge::Gauge::of(&solution.fit)?;
+    let gauge = gauge::Gauge::of(&solution.fit, &solution.in_frame)?;
     let Adjustment { problem, state } = &solution.fit.adjustment;
     let depths = depths_m(problem, &solution.free_poses);
     let mut names: Vec<String> = Vec::new();

@@ -9,6 +9,7 @@ use super::names::{ImageNames, plate_name};
 use super::npy;
 #[cfg(feature = "report")]
 use super::report::{self, Thumbnails, poses_html};
+use super::solution::estimates::covariance_of_columns;
 use super::solution::finding_record::FindingRecord;
 use super::solution::image_records::ImageRecords;
 use super::solution::solution_json::{ProgramRecord, StatisticsRecord};
@@ -200,7 +201,7 @@ fn poses_record(
         cameras: seen.cameras(),
         plates: seen.plates(),
         images: seen.images(),
-        estimates: seen.estimates()?,
+        estimates: seen.estimates(&covariance_of_columns(&found.fit, gauge, None))?,
         known: found.sigmas(),
         against: context.against.clone(),
     })

@@ -8,12 +8,12 @@ use crate::outputs_support::truth_frame::{
 };
 use crate::outputs_support::{context, robot, series, series_with_bar_in_two_places};
 use crate::robots::made_with;
-use crate::whole::positions;
+use crate::whole::{PoseYaml, positions};
 use nalgebra::{DMatrix, Matrix6, Vector3};
 use rayon::prelude::*;
 use robotcal::assess::{FlangeModel, Limits};
 use robotcal::geom::{Pose, adjoint, rigid_fit, skew};
-use robotcal::identify::{JointNoise, Options, RobotModel, Solution, identify};
+use robotcal::identify::{Estimator, JointNoise, Options, RobotModel, Solution, identify};
 use robotcal::model::camera::MAX_PARAMETERS;
 use robotcal::model::plate_modes::{MODES, basis};
 use robotcal::output::files;
@@ -184,14 +184,7 @@ fn table(files: &BTreeMap<String, Vec<u8>>, name: &str) -> Vec<BTreeMap<String, 
 fn check(solution: &Solution, files: &BTreeMap<String, Vec<u8>>) {
     let Adjustment { problem, state } = &solution.fit.adjustment;
     let joint = Whole::new(solution.fit.linear());
-    #[derive(serde::Deserialize)]
-    struct PoseYaml {
-        covariance: Vec<f64>,
-    }
-    let read = |name: &str| -> Matrix6<f64> {
-        let yaml: PoseYaml = serde_saphyr::from_str(std::str::from_utf8(&files[name]).unwrap()).unwrap();
-        Matrix6::from_row_slice(&yaml.covariance)
-    };
+    let read = |name: &str| Matrix6::from_row_slice(&PoseYaml::read(files, name).covariance);
     let camera_start = problem.layout.mountings[0].start;
     let names: Vec<String> = match problem.placements.as_slice() {
         [_] => vec!["plate_pose.yaml".to_owned()],
@@ -301,6 +294,29 @@ fn covariances_are_those_in_the_frame_of_the_nominal_markers() {
         let solution = identify(chain, &[series(mount, &description)], &options).unwrap();
         check(&solution, &files(&solution, &context(&description)).unwrap());
     }
+}
+
+/// A second stage states the pose of the plate: plate_pose.yaml says of it what solution.json says.
+#[test]
+fn a_plate_of_a_result_in_two_stages_is_as_well_known_in_all_files() {
+    let description = robot();
+    let estimator = Estimator::BlocksAndRepeatability;
+    let options = Options { model: RobotModel::Rigid, estimator, ..Options::default() };
+    let chain = description.chain(None, None).unwrap();
+    let solution = identify(chain, &[series(CameraMount::Hand, &description)], &options).unwrap();
+    let files = files(&solution, &context(&description)).unwrap();
+    let written = PoseYaml::read(&files, "plate_pose.yaml");
+    let record: serde_json::Value = serde_json::from_slice(&files["solution.json"]).unwrap();
+    let lower: Vec<f64> = serde_json::from_value(record["covariance_lower"].clone()).unwrap();
+    let start = solution.fit.problem.layout.placements[0].start;
+    let stated = |i: usize, j: usize| lower[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
+    let stated = Matrix6::from_fn(|i, j| stated(start + i, start + j));
+    let off = relative(&Matrix6::from_row_slice(&written.covariance), &stated);
+    println!("off by {off:e} sigma^2");
+    assert!(off < 1e-9);
+    let second_stage = solution.fit.covariance.block(start);
+    let pose = (second_stage.trace() / stated.trace()).sqrt();
+    assert!((pose - 1.0).abs() < 0.05, "that of the second stage: {pose}");
 }
 
 /// What the tolerance of the markers leaves open of the frame of the plate is no error of the flange: with three times the tolerance, which is

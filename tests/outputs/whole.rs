@@ -33,7 +33,7 @@ pub(super) struct PoseYaml {
     xyz_m: [f64; 3],
     quat_xyzw: [f64; 4],
     rpy_rad: [f64; 3],
-    covariance: Vec<f64>,
+    pub(super) covariance: Vec<f64>,
 }
 
 impl PoseYaml {

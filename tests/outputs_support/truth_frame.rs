@@ -12,7 +12,7 @@ use robotcal::identify::{JointNoise, Options, RobotModel, Solution, adjust_free_
 use robotcal::problem::{Adjustment, Mark, MarkerObservation, PlateShape, State, Tie, release_measured_scales};
 use robotcal::series::{Plate, PlateKind, ScaleBar};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
-use robotcal::solve::{Fit, Settings, solve};
+use robotcal::solve::{Fit, Settings, in_frame, solve};
 use robotcal::study::measured;
 
 use super::{context, robot};
@@ -179,7 +179,8 @@ pub fn result(template: &Solution, world: &SimulatedSeries) -> BTreeMap<String, 
     let fit = Fit { adjustment, linearised, covariance };
     let description = robot();
     let series = vec![measured(world, &description.chain(None, None).unwrap())];
-    let solution = Solution { fit, free_poses, series, ..template.clone() };
+    let in_frame = in_frame(fit.linear(), &fit.covariance).unwrap();
+    let solution = Solution { fit, in_frame, free_poses, series, ..template.clone() };
     robotcal::output::files(&solution, &context(&description)).unwrap()
 }
 

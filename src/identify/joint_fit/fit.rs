@@ -168,9 +168,9 @@ impl JointFit {
             false => (fit, None, held_out),
         };
         let estimated = noise == JointNoise::Estimated && joint.is_none();
-        let mut uncertainty = {
+        let (mut uncertainty, in_frame) = {
             let _stage = stage("uncertainty");
-            judge(&mut fit, estimated, before, limits)
+            judge(&mut fit, estimated, before, limits)?
         };
         diagnosis.after_uncertainty(&uncertainty, &accuracy);
         let findings = diagnosis.findings();
@@ -183,6 +183,7 @@ impl JointFit {
             joint,
             series: series.to_vec(),
             uncertainty,
+            in_frame,
             evidences: Vec::new(),
             lenses: Vec::new(),
             fit,

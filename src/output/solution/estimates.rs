@@ -71,7 +71,7 @@ pub(super) fn estimates(
 }
 
 /// The covariance of the dense part that is stated, without a robot that of the fit; that of placements is of the poses that are written.
-pub(super) fn covariance_of_columns(fit: &Fit, gauge: &Gauge, uncertainty: Option<&Uncertainty>) -> DMatrix<f64> {
+pub fn covariance_of_columns(fit: &Fit, gauge: &Gauge, uncertainty: Option<&Uncertainty>) -> DMatrix<f64> {
     let layout = &fit.problem.layout;
     let of_fit = || fit.covariance.reduced.view((0, 0), (layout.len(), layout.len())).into_owned();
     let mut stated = uncertainty.map_or_else(of_fit, |u| u.covariance.clone());

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::Matrix6;
+use nalgebra::{DMatrix, Matrix6};
 
-use super::estimates::{covariance_of_columns, estimates};
+use super::estimates::estimates;
 use super::residuals::{poses, residuals};
 use super::solution_json::{
     ApparentShift, CameraRecord, EstimateRecord, FreePoseRecord, ImageRecord, ObservationColumns, PlateRecord,
@@ -42,13 +42,12 @@ pub struct ImageRecords<'a> {
 }
 
 impl ImageRecords<'_> {
-    /// Every scalar estimate.
+    /// Every scalar estimate, by the covariance that is `stated`.
     ///
     /// # Errors
     /// Estimates that are not finite.
-    pub fn estimates(&self) -> Result<Vec<EstimateRecord>> {
-        let stated = covariance_of_columns(self.fit, self.gauge, self.uncertainty);
-        estimates(self.fit, self.names, &stated, self.uncertainty)
+    pub fn estimates(&self, stated: &DMatrix<f64>) -> Result<Vec<EstimateRecord>> {
+        estimates(self.fit, self.names, stated, self.uncertainty)
     }
 
     /// Residuals in numbers.

@@ -76,7 +76,7 @@ pub fn record(solution: &Solution, context: &Context, gauge: &Gauge, files: Vec<
             larger_stated: solution.uncertainty.larger_stated,
         }),
         workspace: solution.uncertainty.workspace.clone(),
-        estimates: seen.estimates()?,
+        estimates: seen.estimates(&stated)?,
         covariance_lower: lower_triangle(&solution.fit, &stated),
         images: seen.images(),
         covariance_together: None,
@@ -136,7 +136,7 @@ fn placements(solution: &Solution, gauge: &Gauge) -> Vec<PlacedRecord> {
     let problem = &solution.fit.problem;
     let placed = |(k, name): (usize, &String)| {
         let determined = determined(solution, problem.layout.placements[k].start);
-        let covariance = determined.then(|| flat(&gauge.placement(problem, k)));
+        let covariance = determined.then(|| flat(&gauge.placed[k]));
         PlacedRecord { name: name.clone(), pose: (&gauge.placements[k]).into(), covariance }
     };
     problem.placements.iter().enumerate().map(placed).collect()

@@ -102,7 +102,7 @@ pub fn placements(solution: &Solution, gauge: &Gauge) -> Vec<(String, String)> {
             parent,
             child: if problem.placements.len() == 1 { "plate" } else { &problem.placements[k] },
             pose: &gauge.placements[k],
-            covariance: gauge.placement(problem, k),
+            covariance: gauge.placed[k],
             remark: INNER,
         };
         out.push((file, text.text()));

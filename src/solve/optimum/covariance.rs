@@ -24,8 +24,8 @@ pub struct Covariance {
     pub(super) added: Option<DMatrix<f64>>,
     /// Factors by which the sigmas of dense columns were enlarged after that.
     pub(super) enlarged: Vec<(usize, f64)>,
-    /// True where the covariance of the first columns is another than that of the system.
-    pub is_replaced: bool,
+    /// How many of the first columns have another covariance than that of the system.
+    pub(super) replaced: usize,
 }
 
 impl LinearProblem<'_> {
@@ -55,13 +55,21 @@ fn fixed_are_known(problem: &Problem, reduced: &mut DMatrix<f64>) {
     }
 }
 
+/// Puts another covariance of the first columns, which go with no others then.
+pub(super) fn put_first(covariance: &mut DMatrix<f64>, first: &DMatrix<f64>) {
+    let n = first.nrows();
+    covariance.rows_mut(0, n).fill(0.0);
+    covariance.columns_mut(0, n).fill(0.0);
+    covariance.view_mut((0, 0), (n, n)).copy_from(first);
+}
+
 impl Covariance {
     /// From the factor of a system.
     pub(in crate::solve) fn of(problem: &Problem, system: System, factor: SymmetricFactor) -> Self {
         let mut reduced = factor.inverse();
         fixed_are_known(problem, &mut reduced);
         let log_determinant = factor.log_determinant();
-        Self { reduced, log_determinant, system, factor, added: None, enlarged: Vec::new(), is_replaced: false }
+        Self { reduced, log_determinant, system, factor, added: None, enlarged: Vec::new(), replaced: 0 }
     }
 
     /// Steps for right-hand sides of their own.
@@ -93,12 +101,15 @@ impl Covariance {
 
     /// Takes another covariance of the first columns, which go with no others then, and says of each whether anything touches it.
     pub fn replace_first(&mut self, covariance: &DMatrix<f64>, touched: impl Fn(usize) -> bool) {
-        let n = covariance.nrows();
-        self.reduced.rows_mut(0, n).fill(0.0);
-        self.reduced.columns_mut(0, n).fill(0.0);
-        self.reduced.view_mut((0, 0), (n, n)).copy_from(covariance);
-        self.system.set_touched((0..n).map(touched));
-        self.is_replaced = true;
+        put_first(&mut self.reduced, covariance);
+        self.replaced = covariance.nrows();
+        self.system.set_touched((0..self.replaced).map(touched));
+    }
+
+    /// The covariance of the first columns, where it is another than that of the system.
+    pub(super) fn replaced_first(&self) -> Option<DMatrix<f64>> {
+        let n = self.replaced;
+        (n > 0).then(|| self.reduced.view((0, 0), (n, n)).into_owned())
     }
 
     /// 6x6 block of six dense columns from `start`.

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-use super::covariance::Covariance;
+use super::covariance::{Covariance, put_first};
 use super::frame::{Frame, frames};
 use crate::error::{Code, Error, Result};
 use crate::model::plate_modes::MODES;
@@ -26,6 +26,8 @@ pub struct InFrame {
     /// The frames, of all plates that were seen.
     pub frames: Vec<Frame>,
     covariance: Covariance,
+    /// Covariance of the first columns by a second stage, whose poses of plates are stated as they are.
+    of_second_stage: Option<DMatrix<f64>>,
 }
 
 /// Six unknowns of a pose that follow the modes of plates.
@@ -45,7 +47,7 @@ enum Place {
     Latent(usize, usize),
 }
 
-/// Covariance with the plates in their frames, with what was added to the covariance `stated`.
+/// Covariance with the plates in their frames, with what was added to the covariance `stated` and what a second stage replaced of it.
 ///
 /// # Errors
 /// Markers that define no frame; normal equations that are singular.
@@ -77,7 +79,7 @@ pub fn in_frame_by(which: Elimination, linear: LinearProblem, stated: &Covarianc
         covariance.add(&followed(added.clone(), &following));
     }
     stated.enlarged.iter().for_each(|&(column, factor)| covariance.enlarge(column, factor));
-    Ok(InFrame { frames, covariance })
+    Ok(InFrame { frames, covariance, of_second_stage: stated.replaced_first() })
 }
 
 /// Poses that follow, of placements and of images without a tie to the robot.
@@ -196,12 +198,17 @@ impl InFrame {
 
     /// Covariance of so many dense columns, the first.
     pub fn dense(&self, columns: usize) -> DMatrix<f64> {
-        self.covariance.reduced.view((0, 0), (columns, columns)).into_owned()
+        let mut all = self.covariance.reduced.view((0, 0), (columns, columns)).into_owned();
+        if let Some(first) = &self.of_second_stage {
+            put_first(&mut all, first);
+        }
+        all
     }
 
     /// Covariance of a placement.
     pub fn placement(&self, start: usize) -> Matrix6<f64> {
-        self.covariance.block(start)
+        let own = self.of_second_stage.as_ref().unwrap_or(&self.covariance.reduced);
+        own.fixed_view::<6, 6>(start, start).into_owned()
     }
 
     /// Covariances of the free camera poses of all images in use.
