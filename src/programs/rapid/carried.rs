@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use super::Task;
 use super::off_zero::places;
-use super::value::{NO_AXIS, Node, external_name};
+use super::value::{Node, external_name};
+use crate::programs::external::NO_AXIS;
 use crate::programs::flow::Either;
 use crate::programs::program::Understood;
 

@@ -20,6 +20,7 @@ use std::ops::Range;
 
 use super::ProgramSetting;
 use super::codes::{Codes, PostureCode};
+use super::external::NO_AXIS;
 use super::field::{Field, FieldPlace};
 use super::flow::{Places, settled};
 use super::itinerary::Itinerary;
@@ -42,8 +43,8 @@ use switching::{Now, Switching};
 use untold::Untold;
 use uses::Use;
 use value::{
-    Displacement, NO_AXIS, Node, TYPES, array_of, check, computed, element, foreign_axis, is_of_external_axes, is_set,
-    node, numbers, undeclared,
+    Displacement, Node, TYPES, array_of, check, computed, element, foreign_axis, is_of_external_axes, is_set, node,
+    numbers, undeclared,
 };
 
 const DIALECT: Dialect =

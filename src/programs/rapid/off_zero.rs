@@ -1,7 +1,7 @@
 //! External axes that targets, and assignments to them, put elsewhere than at zero.
 
-use super::value::{NO_AXIS, Node, node};
-use crate::programs::external::OffZero;
+use super::value::{Node, node};
+use crate::programs::external::{NO_AXIS, OffZero};
 use crate::programs::scan::Reader;
 
 /// Where a target puts its external axes, by their number from 0; `None` where it does not tell of any, or has none of its own.

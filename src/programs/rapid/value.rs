@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
-pub(super) use crate::programs::external::NO_AXIS;
+use crate::programs::external::NO_AXIS;
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::Reader;
 
