@@ -134,63 +134,34 @@ enum Unit {
 
 pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     let place = ResultFolder::among(&args.out)?;
-    let robot = |file: &Path, compensation: Option<&PathBuf>| robot(args, file, compensation.map(PathBuf::as_path));
     let nominal = args.nominal.as_ref().or(args.from.as_ref()).unwrap_or(&args.urdf);
-    let controller = robot(nominal, None)?;
-    let to = robot(&args.urdf, args.compensation.as_ref())?;
-    let from = args.from.as_ref().map(|f| robot(f, args.from_compensation.as_ref())).transpose()?;
-    for (file, other) in [(Some(&args.urdf), Some(&to)), (args.from.as_ref(), from.as_ref())] {
-        if let (Some(file), Some(other)) = (file, other) {
-            same_joints(nominal, &controller.chain, file, &other.chain)?;
-        }
-    }
+    let robots = Robots::read(args, nominal)?;
+    let (controller, sides) = (&robots.controller, robots.sides(args));
     let axes = axes(args, &controller.chain)?;
-    let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<Vec<_>>>()?;
-    let language = language(args)?;
-    files.iter().try_for_each(is_text)?;
+    let (language, files) = program_files(args)?;
     let setting = setting(args, nominal, &controller.chain, &axes, language)?;
     let mut program = programs::read(language, files, &setting)?;
     poses_have_model(args, &program)?;
     if args.nearest_posture {
         program.heed_no_codes();
     }
-    let sides = Sides {
-        to: Side { robot: &to, urdf: &args.urdf, solution: args.solution.as_deref() },
-        from: from.as_ref().zip(args.from.as_ref()).map(|(robot, urdf)| Side {
-            robot,
-            urdf,
-            solution: args.from_solution.as_deref(),
-        }),
-    };
     let choice = Choice::read(args.frames.as_deref(), args.from_frames.as_deref(), &sides)?;
     let framed = choice.framed(&sides)?;
     let frames = choice.measured(&sides, language, &setting)?;
     let models = Models {
-        controller: &controller,
-        from: from.as_ref().unwrap_or(&controller),
-        to: &to,
+        controller,
+        from: robots.from.as_ref().unwrap_or(controller),
+        to: &robots.to,
         frames: frames.as_ref(),
         beyond: [true, false].map(|taught| framed.as_ref().ok().and_then(|all| known_error(all, taught))),
     };
     let done = programs::compensate(&program, models, &postures(args, &controller.chain, &axes)?);
     done.tell_what_moves(&mut program);
     let left = done.left(&program);
-    let expected = choice.expected(&sides, &framed, &program, &done)?;
+    let (expected, meant) = (choice.expected(&sides, &framed, &program, &done)?, choice.meant());
     let mut findings = model_findings(args, nominal, &models, &sides)?;
-    let read = args.programs.iter().zip(&program.files);
-    findings.extend(read.filter_map(|(path, file)| corrected_already(path, file, args.from.is_some())));
-    findings.extend(corrections::nominal_findings(&program, &done));
-    findings.extend(corrections::displaced_finding(&program, &done));
-    let subject = args.urdf.display().to_string();
-    let meant = choice.meant();
-    findings.extend(corrections::expected_findings(
-        expected.as_deref().map_err(|why| why.as_str()),
-        &done,
-        &meant,
-        &subject,
-    ));
-    findings.extend(corrections::left_finding(&left, &subject));
-    findings.extend(corrections::missing_finding(&program, &left, &subject));
+    let said = expected.as_deref().map_err(|why| why.as_str());
+    findings.extend(program_findings(args, (&program, &done, &left), (said, &meant)));
     let report = corrections::table(&program, &done, expected.as_deref().ok(), &controller.chain);
     let written = write(args, &place, &program, &done, &findings, &report)?;
     say!("{}", text(&program, &done.outcomes, &left, &controller.chain));
@@ -199,6 +170,51 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     let verdict = verdict(&left, &findings, &meant);
     say_line!("results   {} ({} files)", args.out.display(), written);
     Ok(verdict)
+}
+
+/// The robots as their files describe them.
+struct Robots {
+    /// By which the controller computes.
+    controller: Robot,
+    /// That runs the program.
+    to: Robot,
+    /// On which it was taught.
+    from: Option<Robot>,
+}
+
+impl Robots {
+    /// # Errors
+    /// Files that cannot be read, or are of robots of several types.
+    fn read(args: &CompensateArgs, nominal: &Path) -> Result<Self> {
+        let controller = robot(args, nominal, None)?;
+        let to = robot(args, &args.urdf, args.compensation.as_deref())?;
+        let from = args.from.as_ref().map(|file| robot(args, file, args.from_compensation.as_deref())).transpose()?;
+        for (file, other) in [(Some(&args.urdf), Some(&to)), (args.from.as_ref(), from.as_ref())] {
+            if let (Some(file), Some(other)) = (file, other) {
+                same_joints(nominal, &controller.chain, file, &other.chain)?;
+            }
+        }
+        Ok(Self { controller, to, from })
+    }
+
+    fn sides<'a>(&'a self, args: &'a CompensateArgs) -> Sides<'a> {
+        Sides {
+            to: Side { robot: &self.to, urdf: &args.urdf, solution: args.solution.as_deref() },
+            from: self.from.as_ref().zip(args.from.as_ref()).map(|(robot, urdf)| Side {
+                robot,
+                urdf,
+                solution: args.from_solution.as_deref(),
+            }),
+        }
+    }
+}
+
+/// The files of the program and their language.
+fn program_files(args: &CompensateArgs) -> Result<(Language, Vec<TextFile>)> {
+    let files = args.programs.iter().map(|p| text_file(p)).collect::<Result<Vec<_>>>()?;
+    let language = language(args)?;
+    files.iter().try_for_each(is_text)?;
+    Ok((language, files))
 }
 
 /// How the program is read.
@@ -292,6 +308,23 @@ fn model_findings(
     let taught = sides.from.as_ref();
     findings.extend(taught.and_then(|from| not_given(from, args.from_compensation.as_deref(), "--from-compensation")));
     Ok(findings)
+}
+
+/// What the program asks for and could not be done, and how accurate what was done is `expected` to be, or why nobody knows.
+fn program_findings(
+    args: &CompensateArgs,
+    (program, done, left): (&Program, &Compensated, &[Left]),
+    (expected, meant): (std::result::Result<&[Option<f64>], &str>, &Meant),
+) -> Vec<FileFinding> {
+    let subject = args.urdf.display().to_string();
+    let read = args.programs.iter().zip(&program.files);
+    (read.filter_map(|(path, file)| corrected_already(path, file, args.from.is_some())))
+        .chain(corrections::nominal_findings(program, done))
+        .chain(corrections::displaced_finding(program, done))
+        .chain(corrections::expected_findings(expected, done, meant, &subject))
+        .chain(corrections::left_finding(left, &subject))
+        .chain(corrections::missing_finding(program, left, &subject))
+        .collect()
 }
 
 /// The link of the chain on which `--base` is fixed, where it does not lie in the chain itself.

@@ -1,12 +1,11 @@
 //! `robotcal frames`: tool and work object of a robot that was identified, from touches.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nalgebra::DMatrix;
 
+use super::frames_text::text;
 use super::zeros::{ReadingsArgs, Zeros};
 use crate::assess::Limits;
 use crate::cli::Verdict;
@@ -20,7 +19,7 @@ use crate::geom::{Pose, matrix_from_rpy};
 use crate::identify::{leave_out_repeated_bodies, measure_bodies, mirror_image, touch_mistake};
 use crate::output::corrections::{FileFinding, numbers};
 use crate::output::frame_files::{self, Frames, Named};
-use crate::output::frame_findings::{at_the_places, frame_findings, mirror_image_fits};
+use crate::output::frame_findings::{frame_findings, mirror_image_fits};
 use crate::output::frames_record::{
     self, FILE_NAME, FORMAT, FramesRecord, KnowledgeRecord, RobotOfFrames, ToolKind, ToolRecord, TouchRecord, WorkKind,
     WorkRecord, checks, flat, rows,
@@ -150,7 +149,7 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     files.insert(format!("{}.frames.urdf", folder_name(std::slice::from_ref(&record.robot.name))), urdf.into_bytes());
     let listed: Vec<(String, &[u8])> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
     place.write_beside(&listed, std::slice::from_ref(&args.from))?;
-    say!("{}", text(args, &made, &fitted, &touches, &robot));
+    say!("{}", text(&args.from, &made, &fitted, &touches, &robot));
     zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
     for notice in &notices {
         say_line!("note      {}", notice.coded());
@@ -450,137 +449,4 @@ fn in_the_base(frames: &Frames, record: &SolutionRecord, fit: &FrameFit) -> Fram
 fn corrected_urdf(record: &SolutionRecord, found: &FoundModel, frames: &Frames) -> Result<String> {
     let origins = found.robot.urdf_origins().into_iter().map(|(joint, origin)| (joint.to_owned(), origin)).collect();
     frame_files::urdf(&patch_origins(&record.urdf.text, &origins)?, frames)
-}
-
-/// Square roots of the diagonal, in thousandths.
-fn sigmas(covariance: &DMatrix<f64>, first: usize) -> [f64; 3] {
-    [0, 1, 2].map(|k| 1e3 * covariance[(first + k, first + k)].max(0.0).sqrt())
-}
-
-/// Rows of touches that are printed.
-const MOST_ROWS: usize = 60;
-
-fn text(args: &FramesArgs, made: &FramesRecord, fit: &FrameFit, touches: &Touches, robot: &KnownRobot) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let _ = table(&mut out, args, made, fit, touches, robot);
-    out
-}
-
-fn table(
-    out: &mut String,
-    args: &FramesArgs,
-    made: &FramesRecord,
-    fit: &FrameFit,
-    touches: &Touches,
-    robot: &KnownRobot,
-) -> std::fmt::Result {
-    let show = |xyz: [f64; 3]| xyz.map(|v| format!("{:.3}", 1e3 * v + 0.0)).join(", ");
-    let three = |s: [f64; 3]| s.map(|v| format!("{v:.3}")).join(", ");
-    writeln!(
-        out,
-        "robot     {}, {} to {}, corrected by {}",
-        made.robot.name,
-        made.robot.base,
-        made.robot.tip,
-        args.from.display()
-    )?;
-    if !touches.all.is_empty() {
-        let used = fit.judged.iter().filter(|j| !j.left_out).count();
-        let stated = touches.all.iter().map(|t| t.sigma_m).fold(0.0, f64::max);
-        writeln!(
-            out,
-            "touches   {used} of {} in use, residual {:.3} mm RMS; sigma {:.3} mm as stated, {:.3} mm as found; joint noise {:.3} mm at the tool",
-            touches.all.len(),
-            1e3 * fit.rms_m,
-            1e3 * stated,
-            1e3 * stated * fit.factor,
-            1e3 * fit.expected.joint_noise_m
-        )?;
-    }
-    if let Some(tool) = &made.tool {
-        let pose = Pose::from(&tool.pose);
-        let how = match &fit.tool_covariances[0] {
-            None => "as given".to_owned(),
-            Some(c) if tool.measured == ToolKind::Pose => {
-                format!("sigma {} mm; sigma of the turn {} mrad", three(sigmas(c, 0)), three(sigmas(c, 3)))
-            }
-            Some(c) => format!("sigma {} mm", three(sigmas(c, 0))),
-        };
-        writeln!(out, "tool      {} on {}: {} mm, {how}", tool.name, tool.parent, show(pose.xyz()))?;
-        if tool.measured != ToolKind::Pose {
-            let rpy = pose.rpy().map(|v| format!("{:.4}", v.to_degrees() + 0.0)).join(", ");
-            writeln!(
-                out,
-                "          roll, pitch, yaw {rpy} deg as given: touches of a point do not tell how the tool is turned"
-            )?;
-        }
-        for (k, name) in touches.bodies.iter().enumerate().skip(1) {
-            writeln!(out, "          also {name}: {} mm", show(fit.tools[k].xyz()))?;
-        }
-    } else {
-        writeln!(out, "tool      not told: nothing was touched")?;
-    }
-    match (&made.work, &fit.work_covariance) {
-        (Some(work), Some(c)) => {
-            let pose = Pose::from(&work.pose);
-            let rpy = pose.rpy().map(|v| format!("{:.4}", v.to_degrees() + 0.0)).join(", ");
-            writeln!(
-                out,
-                "work      {} in {}: {} mm; roll, pitch, yaw {rpy} deg",
-                work.name,
-                work.parent,
-                show(pose.xyz())
-            )?;
-            if work.measured == WorkKind::Plate {
-                writeln!(
-                    out,
-                    "          the plate of the solution: known relative to the robot as the images tell it"
-                )?;
-            } else {
-                let (c, _) = at_the_places(c, touches);
-                let c = DMatrix::from_column_slice(6, 6, c.as_slice());
-                writeln!(
-                    out,
-                    "          sigma {} mm in the middle of the places, {} mrad about its axes",
-                    three(sigmas(&c, 0)),
-                    three(sigmas(&c, 3))
-                )?;
-            }
-        }
-        _ => writeln!(
-            out,
-            "work      not told: no place is known (x_m, y_m, z_m of contacts.csv); the base stands where the description says"
-        )?,
-    }
-    let of = if made.work.is_some() { "in the work object" } else { "in the base" };
-    writeln!(
-        out,
-        "expected  tool {of} {:.3} mm RMS over the {} stops of the solution and the touches (without these frames {:.3} mm), and joint noise {:.3} mm",
-        1e3 * fit.expected.with_frames_m,
-        robot.stops.len(),
-        1e3 * fit.expected.without_m,
-        1e3 * fit.expected.joint_noise_m
-    )?;
-    if !made.touches.is_empty() {
-        writeln!(
-            out,
-            "{:>10}  {:<12} {:>9} {:>9} {:>9} {:>8}  {:>6}",
-            "stop", "at", "dx mm", "dy mm", "dz mm", "mm", "sigmas"
-        )?;
-    }
-    for t in made.touches.iter().take(MOST_ROWS) {
-        let [x, y, z] = t.residual_m.map(|v| 1e3 * v);
-        let length = 1e3 * t.residual_m.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let left = if t.left_out { "  left out" } else { "" };
-        writeln!(
-            out,
-            "{:>10}  {:<12} {x:>9.3} {y:>9.3} {z:>9.3} {length:>8.3}  {:>6.1}{left}",
-            t.stop, t.at, t.sigmas
-        )?;
-    }
-    if made.touches.len() > MOST_ROWS {
-        writeln!(out, "          {} more in {FILE_NAME}", made.touches.len() - MOST_ROWS)?;
-    }
-    Ok(())
 }

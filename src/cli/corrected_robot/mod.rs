@@ -1,13 +1,14 @@
 //! Subcommands that use an identified robot: `frames` finds its tool and work object, `compensate` corrects its programs, `verify` judges it by other
 //! measurements.
 //!
-//! `compensate_frames` and `compensate_models` say what is known of the robots of a program; `verify` reads the flags of `verify_args`, takes what was stated
+//! `frames_text` is what `frames` prints; `compensate_frames` and `compensate_models` say what is known of the robots of a program; `verify` reads the flags of `verify_args`, takes what was stated
 //! from `verify_stated`, judges points itself and series in `verify_series`, and ends in `verify_verdict`; `zeros` says which controller readings are of.
 
 pub mod compensate;
 mod compensate_frames;
 mod compensate_models;
 pub mod frames;
+mod frames_text;
 pub mod verify;
 pub mod verify_args;
 mod verify_series;

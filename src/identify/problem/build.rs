@@ -32,59 +32,8 @@ const FIRST_DISPLACEMENT: f64 = 1e-3;
 ///
 /// With `local_errors` the errors of readings that stops have in common become columns.
 pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limits: &Limits) -> Result<Adjustment> {
-    let (mut cameras, mut mountings, mut placements, mut plate_names) = (vec![], vec![], vec![], vec![]);
-    let (mut lenses, mut plates): (Vec<Camera>, Vec<Plate>) = (vec![], vec![]);
     let (mut stops, places) = stops_of(series);
-    let mut images: Vec<Image> = vec![];
-    let mut seen_before = SeenBefore::default();
-    for (index, s) in series.iter().enumerate().filter(|(_, s)| s.has_images) {
-        let camera = intern(&mut cameras, &s.camera);
-        if camera == lenses.len() {
-            let known = s.known_camera.as_ref().map(|k| k.camera.clone());
-            let unknown = || Camera::pinhole(s.lens, s.width_px, s.height_px, f64::from(s.width_px));
-            lenses.push(known.unwrap_or_else(unknown));
-        }
-        if (lenses[camera].width_px, lenses[camera].height_px) != (s.width_px, s.height_px) {
-            return Err(Error::new(
-                Code::SeriesDisagree,
-                format!("series {}", s.name),
-                format!(
-                    "camera '{}' has images of {}x{} px here and of {}x{} px in an earlier series",
-                    s.camera, s.width_px, s.height_px, lenses[camera].width_px, lenses[camera].height_px
-                ),
-                "give different cameras different names in [camera] of series.toml",
-            ));
-        }
-        let plate = intern(&mut plate_names, &s.plate_name);
-        if plate == plates.len() {
-            plates.push(s.plate.clone());
-        }
-        let mounting = intern(&mut mountings, &s.mounting);
-        let originals = seen_before.originals(s);
-        for (row, stop) in s.stops.iter().enumerate() {
-            let observations = measured(stop, s)?;
-            let duplicate = originals[row].clone().map(|of| ImageRejection::Duplicate { of });
-            let rejected = stop.left_out.clone().or(duplicate).or_else(|| {
-                let found = observations.len();
-                let needed = limits.image_observations;
-                (found < needed).then_some(ImageRejection::TooFewMarkers { found, needed })
-            });
-            images.push(Image {
-                name: stop.image.clone(),
-                series: index,
-                stop: places[index][row],
-                camera,
-                mounting,
-                placement: intern(&mut placements, &stop.placement),
-                plate,
-                mount: s.mount,
-                observations: observations.into(),
-                rejected,
-            });
-        }
-    }
-    // Images of one stop follow each other.
-    images.sort_by_key(|image| image.stop);
+    let pictured = Pictured::of(series, &places, limits)?;
     let bodies = Bodies::of(series, &places);
     let runs = stops.last().map_or(0, |s| s.series + 1);
     let mut robot = robot.clone();
@@ -97,52 +46,52 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     let readings = robot.chain.readings.len();
     let state = State {
         robot,
-        mountings: vec![Pose::identity(); mountings.len()],
-        placements: vec![Pose::identity(); placements.len()],
+        mountings: vec![Pose::identity(); pictured.mountings.len()],
+        placements: vec![Pose::identity(); pictured.placements.len()],
         instruments: vec![Pose::identity(); bodies.instruments.len()],
         bodies: vec![Pose::identity(); bodies.names.len()],
-        plates: plates.iter().map(PlateShape::nominal).collect(),
+        plates: pictured.plates.iter().map(PlateShape::nominal).collect(),
         joint_errors: vec![Vec::new(); stops.len()],
-        ties: vec![Tie::Free(Pose::identity()); images.len()],
-        cameras: lenses,
+        ties: vec![Tie::Free(Pose::identity()); pictured.images.len()],
+        cameras: pictured.lenses,
     };
     let names = Names {
-        mountings: &mountings,
-        placements: &placements,
-        cameras: &cameras,
-        plates: &plate_names,
+        mountings: &pictured.mountings,
+        placements: &pictured.placements,
+        cameras: &pictured.cameras,
+        plates: &pictured.plate_names,
         instruments: &bodies.instruments,
         bodies: &bodies.names,
     };
     let mut layout = Layout::new(&state, &names);
-    release_measured_scales(&mut layout, &plates);
+    release_measured_scales(&mut layout, &pictured.plates);
     for s in series.iter().filter(|s| s.known_camera.as_ref().is_some_and(|k| k.held)) {
-        let own = cameras.iter().position(|c| *c == s.camera).map(|k| layout.cameras[k].clone());
+        let own = pictured.cameras.iter().position(|c| *c == s.camera).map(|k| layout.cameras[k].clone());
         own.into_iter().flatten().for_each(|c| layout.columns[c].free = false);
     }
     bodies.hold_unseen_turns(&mut layout);
     for (plate, shape) in layout.shapes.clone().into_iter().enumerate() {
         let is_circle = |o: &MarkerObservation| o.mark != Mark::Corner;
-        let own = images.iter().filter(|image| image.plate == plate);
+        let own = pictured.images.iter().filter(|image| image.plate == plate);
         layout.columns[shape.start + DOT_GAIN].free = own.flat_map(|i| i.observations.iter()).any(is_circle);
     }
     let noise = Noise {
-        pixel_factor: vec![1.0; cameras.len()],
+        pixel_factor: vec![1.0; pictured.cameras.len()],
         joint: vec![vec![FIRST_JOINT_NOISE; readings]; runs],
         local: first_local(&state, &layout),
         displacement: Vec::new(),
         marker: Vec::new(),
         body: vec![[1.0; 2]; bodies.components],
     };
-    let families = (0..cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
+    let families = (0..pictured.cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
     let mut problem = Problem {
         layout,
-        plates,
-        placements,
-        mountings,
-        cameras,
+        plates: pictured.plates,
+        placements: pictured.placements,
+        mountings: pictured.mountings,
+        cameras: pictured.cameras,
         stops,
-        images,
+        images: pictured.images,
         instruments: bodies.instruments,
         bodies: bodies.names,
         body_measurements: bodies.measurements,
@@ -156,6 +105,83 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     let sizes = if problem.tells_displacements().contains(&true) { DISPLACEMENT_SIZES } else { 1 };
     problem.noise.displacement = vec![FIRST_DISPLACEMENT; runs * sizes];
     Ok(Adjustment { problem, state })
+}
+
+/// The images of all series, and what they are of, each named once.
+#[derive(Default)]
+struct Pictured {
+    cameras: Vec<String>,
+    /// As they start, one a camera.
+    lenses: Vec<Camera>,
+    mountings: Vec<String>,
+    placements: Vec<String>,
+    plate_names: Vec<String>,
+    /// One a name.
+    plates: Vec<Plate>,
+    /// Those of one stop follow each other.
+    images: Vec<Image>,
+}
+
+impl Pictured {
+    fn of(series: &[MeasuredSeries], places: &[Vec<usize>], limits: &Limits) -> Result<Self> {
+        let (mut all, mut seen_before) = (Self::default(), SeenBefore::default());
+        for (index, s) in series.iter().enumerate().filter(|(_, s)| s.has_images) {
+            let camera = all.camera(s)?;
+            let plate = intern(&mut all.plate_names, &s.plate_name);
+            if plate == all.plates.len() {
+                all.plates.push(s.plate.clone());
+            }
+            let mounting = intern(&mut all.mountings, &s.mounting);
+            let originals = seen_before.originals(s);
+            for (row, stop) in s.stops.iter().enumerate() {
+                let observations = measured(stop, s)?;
+                let duplicate = originals[row].clone().map(|of| ImageRejection::Duplicate { of });
+                let rejected = stop.left_out.clone().or(duplicate).or_else(|| {
+                    let found = observations.len();
+                    let needed = limits.image_observations;
+                    (found < needed).then_some(ImageRejection::TooFewMarkers { found, needed })
+                });
+                let placement = intern(&mut all.placements, &stop.placement);
+                all.images.push(Image {
+                    name: stop.image.clone(),
+                    series: index,
+                    stop: places[index][row],
+                    camera,
+                    mounting,
+                    placement,
+                    plate,
+                    mount: s.mount,
+                    observations: observations.into(),
+                    rejected,
+                });
+            }
+        }
+        all.images.sort_by_key(|image| image.stop);
+        Ok(all)
+    }
+
+    /// The camera of a series.
+    fn camera(&mut self, s: &MeasuredSeries) -> Result<usize> {
+        let camera = intern(&mut self.cameras, &s.camera);
+        if camera == self.lenses.len() {
+            let known = s.known_camera.as_ref().map(|k| k.camera.clone());
+            let unknown = || Camera::pinhole(s.lens, s.width_px, s.height_px, f64::from(s.width_px));
+            self.lenses.push(known.unwrap_or_else(unknown));
+        }
+        let (width, height) = (self.lenses[camera].width_px, self.lenses[camera].height_px);
+        if (width, height) != (s.width_px, s.height_px) {
+            return Err(Error::new(
+                Code::SeriesDisagree,
+                format!("series {}", s.name),
+                format!(
+                    "camera '{}' has images of {}x{} px here and of {width}x{height} px in an earlier series",
+                    s.camera, s.width_px, s.height_px
+                ),
+                "give different cameras different names in [camera] of series.toml",
+            ));
+        }
+        Ok(camera)
+    }
 }
 
 /// Stops of all series, and those of the rows of each: rows of one place in a run are one stop.

@@ -88,9 +88,12 @@ pub(super) struct Collector<'a> {
 }
 
 /// Finished stops by the time of their picture.
+pub(super) type Rows = BTreeMap<i64, (SeriesStop, StopReport)>;
+
+/// What was taken of a recording.
 #[derive(Default)]
 pub(super) struct Taken {
-    pub rows: BTreeMap<i64, (SeriesStop, StopReport)>,
+    pub rows: Rows,
     /// How many pictures could not be read, and why the first could not.
     pub malformed: Option<(usize, String)>,
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::collect::{Collector, Group, StopReport, unlike};
+use super::collect::{Collector, Group, Rows, StopReport, unlike};
 use super::delay::{self, Delay, Frames, Guess};
 use super::file::for_each;
 use super::messages::CameraInfo;
@@ -112,41 +112,12 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let is_unit_in_doubt = seems_degrees.is_some();
     scan.notices.extend(seems_degrees);
     std::fs::create_dir_all(images).map_err(|e| Error::io(images, &e))?;
-    let mut collector = Collector::new(groups, images, options, (&postures, &factors));
-    for file in scan.files.clone() {
-        // Damage was told of by the first pass.
-        for_each(&file, |message| if message.topic == image_topic { collector.take(&message) } else { Ok(()) })?;
-    }
-    let taken = collector.finish()?;
-    if taken.rows.is_empty() {
-        let place = format!("{}, topic {image_topic}", recording.display());
-        let what = taken
-            .malformed
-            .map_or("no image can be read".into(), |(_, reason)| format!("no image can be read: one {reason}"));
-        return Err(Error::new(
-            Code::MessagesUnreadable,
-            place,
-            what,
-            "record as mono8, mono16, rgb8, bayer or compressed (jpeg, png)",
-        ));
-    }
+    let collector = Collector::new(groups, images, options, (&postures, &factors));
+    let (rows, unread) = collected(&scan, &image_topic, collector)?;
     let mut notices = std::mem::take(&mut scan.notices);
-    if let Some((count, reason)) = taken.malformed {
-        let place = format!("{}, topic {image_topic}", recording.display());
-        notices.push(Notice::new(
-            Code::MessagesUnreadable,
-            place,
-            format!("{count} images cannot be read: one {reason}"),
-            "they are left out",
-        ));
-    }
+    notices.extend(unread);
     if growth_s.abs() > NOTABLE_DELAY_S {
-        let what = format!(
-            "images take {} from stamp to arrival at the end than at the beginning, joint states do not: the clocks of camera and robot run apart",
-            difference(growth_s)
-        );
-        let remedy = "use the times of recording (--clock log), or let one clock stamp both";
-        notices.push(Notice::new(Code::ClocksApart, recording.display(), what, remedy));
+        notices.push(run_apart(recording, growth_s));
     } else if is_open {
         let what = format!(
             "{}, and motion in the images does not tell which is right: images are taken where the robot stands still by either",
@@ -155,7 +126,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         notices.push(Notice::new(Code::ImagesDelayed, recording.display(), what, OTHER_CLOCK));
     }
     notices.extend((told == Told::Open && !is_open).then(|| delay::unchecked(recording)));
-    let (stops, reports): (Vec<_>, Vec<_>) = taken.rows.into_values().unzip();
+    let (stops, reports): (Vec<_>, Vec<_>) = rows.into_values().unzip();
     notices.extend(unlike(recording, &reports));
     Ok(Extracted {
         stops: Stops { joints, stops, ..Stops::default() },
@@ -170,6 +141,41 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         notices,
         inputs: scan.inputs,
     })
+}
+
+/// Takes the pictures out of the recording: stops with their reports by their places, and what is said of images that cannot be read.
+///
+/// # Errors
+/// No image that can be read; a picture that cannot be written.
+fn collected(scan: &Scan, topic: &str, mut collector: Collector<'_>) -> Result<(Rows, Option<Notice>)> {
+    for file in &scan.files {
+        // Damage was told of by the first pass.
+        for_each(file, |message| if message.topic == topic { collector.take(&message) } else { Ok(()) })?;
+    }
+    let taken = collector.finish()?;
+    let place = format!("{}, topic {topic}", scan.recording.display());
+    if taken.rows.is_empty() {
+        let what = taken
+            .malformed
+            .map_or("no image can be read".into(), |(_, reason)| format!("no image can be read: one {reason}"));
+        let remedy = "record as mono8, mono16, rgb8, bayer or compressed (jpeg, png)";
+        return Err(Error::new(Code::MessagesUnreadable, place, what, remedy));
+    }
+    let unread = taken.malformed.map(|(count, reason)| {
+        let what = format!("{count} images cannot be read: one {reason}");
+        Notice::new(Code::MessagesUnreadable, place, what, "they are left out")
+    });
+    Ok((taken.rows, unread))
+}
+
+/// Clocks of images and joints that run apart by so much from begin to end, s.
+fn run_apart(recording: &Path, growth_s: f64) -> Notice {
+    let what = format!(
+        "images take {} from stamp to arrival at the end than at the beginning, joint states do not: the clocks of camera and robot run apart",
+        difference(growth_s)
+    );
+    let remedy = "use the times of recording (--clock log), or let one clock stamp both";
+    Notice::new(Code::ClocksApart, recording.display(), what, remedy)
 }
 
 /// What to do where stamps and arrival contradict each other.
