@@ -280,12 +280,8 @@ fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<(
         seconds(first.time_ns),
         seconds(last.time_ns)
     );
-    Err(Error::new(
-        Code::ClocksApart,
-        place,
-        what,
-        "synchronise the clocks, or use the times of recording (--clock log)",
-    ))
+    let remedy = "synchronise the clocks, or use the times of recording (--clock log)";
+    Err(or_set_back(Error::new(Code::ClocksApart, place, what, remedy), &scan.notices))
 }
 
 /// Images of the standstills; where it is `open` whether they are late by so many ns, those of both. `sigma_s`: as [`Told::sigma_s`].
@@ -524,9 +520,17 @@ mod tests {
     fn a_clock_that_was_set_back_is_the_cause_of_times_that_do_not_fit() {
         let apart = || Error::new(Code::ClocksApart, "run", "apart", OTHER_CLOCK);
         let set = Notice::new(Code::ClockSetBack, "run", "back", "");
-        let error = or_set_back(apart(), &[set]);
+        let error = or_set_back(apart(), std::slice::from_ref(&set));
         assert_eq!((error.code, error.remedy == OTHER_CLOCK), (Code::ClocksApart, false));
         assert_eq!(or_set_back(apart(), &[]), apart());
+        let (postures, times) = recorded(&[(100, false), (80, true)].repeat(4));
+        let later: Vec<i64> = times.iter().map(|t| t + 3_600_000_000_000).collect();
+        let refused = |notices: Vec<Notice>| {
+            require_overlap(&Scan { notices, ..Scan::default() }, &postures, &later).unwrap_err()
+        };
+        let [told, untold] = [vec![set], Vec::new()].map(refused);
+        assert_eq!([told.code, untold.code], [Code::ClocksApart; 2]);
+        assert!(told.what.ends_with("; back") && told.remedy != untold.remedy, "{told:?}");
     }
 
     #[test]
