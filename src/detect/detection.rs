@@ -15,6 +15,8 @@ pub struct Detection {
     pub circles: Option<Circles>,
     /// What the user should know though the work went on.
     pub notices: Vec<Notice>,
+    /// True where it is of the negative of the picture, in which bright markers are dark.
+    pub is_of_negative: bool,
     /// Whether the outer lines of a board were there.
     pub outline: Outline,
     /// Columns and rows of a chessboard or a grid of dots, in either order, where an outer line is missing and all ends are in view.

@@ -37,6 +37,12 @@ pub fn few_grey_levels(detection: &Detection, levels: usize) -> Option<Notice> {
     (!detection.observations.is_empty()).then(|| Notice::new(Code::FewGreyLevels, "image", what, remedy))
 }
 
+/// What is said of a series with dark and white images, too.
+pub fn flat_field_left_out() -> Notice {
+    let what = "dark and white images are not applied to it: so few grey levels are no measure of the light";
+    Notice::new(Code::FlatFieldLeftOut, "image", what, "store images in grey levels (8 bits or more)")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

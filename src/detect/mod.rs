@@ -26,6 +26,7 @@ pub use dot_sizes::set_radii;
 pub use pictures::flat_field::FlatField;
 pub use pictures::flat_field_facts::{FlatFieldFacts, LightDrift};
 pub use pictures::load::{load, load_bytes};
+pub use pictures::loaded::Loaded;
 pub use pictures::picture::Picture;
 pub use run::{SeriesImage, detect_series};
 
@@ -33,7 +34,7 @@ use std::collections::BTreeSet;
 
 use crate::error::{Code, Error, Result};
 use crate::series::{Plate, PlateKind};
-use grey_levels::{allow_for_rounding, few_grey_levels};
+use grey_levels::{allow_for_rounding, few_grey_levels, flat_field_left_out};
 use pictures::few_levels::few_levels;
 use pictures::hot_pixels::{hot_pixels, without_hot_pixels};
 
@@ -55,7 +56,18 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
 
 /// As [`detect`], but a picture in which nothing can be identified still says what was seen: see [`Detection::failure`].
 pub fn examine(picture: &Picture, plate: &Plate) -> Detection {
-    let levels = few_levels(picture);
+    examine_with(picture, few_levels(picture), plate)
+}
+
+/// As [`examine`], a picture that was loaded.
+fn examine_loaded(loaded: &Loaded, plate: &Plate) -> Detection {
+    let mut detection = examine_with(&loaded.picture, loaded.few_levels, plate);
+    let is_said = loaded.is_uncorrected && !detection.observations.is_empty();
+    detection.notices.extend(is_said.then(flat_field_left_out));
+    detection
+}
+
+fn examine_with(picture: &Picture, levels: Option<usize>, plate: &Plate) -> Detection {
     let mended = mended(picture, levels);
     let looked_at = mended.as_ref().map_or(picture, |(mended, _)| mended);
     let mut detection =
@@ -70,10 +82,10 @@ pub fn examine(picture: &Picture, plate: &Plate) -> Detection {
 }
 
 /// Looks once more in a picture that was examined, for the markers that are predicted and were not found: see [`circles::detect_predicted`].
-pub fn examine_predicted(picture: &Picture, detection: &mut Detection, predicted: &[circles::Predicted]) {
-    let levels = few_levels(picture);
-    let mended = mended(picture, levels);
-    let looked_at = mended.as_ref().map_or(picture, |(mended, _)| mended);
+pub fn examine_predicted(loaded: Loaded, detection: &mut Detection, predicted: &[circles::Predicted]) {
+    let Loaded { picture, few_levels: levels, .. } = if detection.is_of_negative { loaded.negative() } else { loaded };
+    let mended = mended(&picture, levels);
+    let looked_at = mended.as_ref().map_or(&picture, |(mended, _)| mended);
     let known: BTreeSet<u32> = detection.observations.iter().map(|o| o.marker).collect();
     circles::detect_predicted(looked_at, detection, predicted);
     if let Some(levels) = levels {

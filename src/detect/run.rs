@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::dot_sizes::told_by_others;
 use super::size_seen::{line_missing, nowhere_whole};
-use super::{Detection, Outline, Picture, examine, other_kind, tags};
+use super::{Detection, Loaded, Outline, examine_loaded, other_kind, tags};
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{batches, is_turned_by_viewers, page_of, picture_size};
 use crate::series::{Plate, PlateKind, spread};
@@ -63,19 +63,21 @@ const fn may_be_bright(kind: PlateKind) -> bool {
 /// plate is a failure in its own place only, and so is one whose size differs from that of most; where outer lines of a chessboard or a grid
 /// of dots are missing in view, or one ends where the plate file does not say, and no image shows all of it, all are failures. Each thread holds one image at a
 /// time, which `picture` reads, and all of them together a gigabyte or one image; `progress` is called after every image, from any thread.
-pub fn detect_series(
+pub fn detect_series<P: Into<Loaded>>(
     images: &[PathBuf],
     plate: &Plate,
-    picture: impl Fn(&Path) -> Result<Picture> + Sync,
+    picture: impl Fn(&Path) -> Result<P> + Sync,
     progress: impl Fn(&Path) + Sync,
 ) -> Vec<SeriesImage> {
+    let picture = |path: &Path| picture(path).map(Into::<Loaded>::into);
     let one = |path: &Path, plate: &Plate, ink: Ink| {
         let mut image = match picture(path) {
             Err(error) => SeriesImage::failed(error),
-            Ok(picture) => {
-                let size = Some((picture.width, picture.height));
-                let picture = if ink == Ink::Bright { picture.negative() } else { picture };
-                SeriesImage { size, detection: examine(&picture, plate) }
+            Ok(loaded) => {
+                let size = Some((loaded.picture.width, loaded.picture.height));
+                let is_of_negative = ink == Ink::Bright;
+                let loaded = if is_of_negative { loaded.negative() } else { loaded };
+                SeriesImage { size, detection: Detection { is_of_negative, ..examine_loaded(&loaded, plate) } }
             }
         };
         name_image(&mut image.detection, path);
@@ -119,7 +121,7 @@ pub fn detect_series(
 fn name_other_kind(
     images: &[PathBuf],
     plate: &Plate,
-    picture: impl Fn(&Path) -> Result<Picture> + Sync,
+    picture: impl Fn(&Path) -> Result<Loaded> + Sync,
     found: &mut [SeriesImage],
 ) {
     // A board of another size is of this kind.
@@ -131,7 +133,7 @@ fn name_other_kind(
     let bytes: Vec<u64> = some.iter().map(|(path, _)| bytes_of(path)).collect();
     let look = |k: usize| {
         let (path, why) = some[k];
-        Some((path, other_kind::named(&picture(path).ok()?, plate, why)?))
+        Some((path, other_kind::named(&picture(path).ok()?.picture, plate, why)?))
     };
     let mut all = batches(&bytes, MOST_IN_FLIGHT).into_iter();
     let Some((shows, named)) = all.find_map(|batch| batch.into_par_iter().find_map_first(look)) else { return };

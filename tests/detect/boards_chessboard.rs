@@ -3,7 +3,7 @@
 use crate::boards_scene::{Scene, View, errors, mirror, rms};
 use crate::said::assert_says;
 use robotcal::Code;
-use robotcal::detect::{Detection, Picture, detect, detect_series};
+use robotcal::detect::{Detection, FlatField, Picture, detect, detect_series};
 use robotcal::series::{Plate, PlateKind};
 
 fn plate(columns: u32, rows: u32) -> Plate {
@@ -130,6 +130,26 @@ fn corners_of_one_bit_are_as_uncertain_as_their_rounding() {
         }
     }
     assert!(sum / f64::from(count) < 1.0, "{sum} over {count}");
+}
+
+/// Levels so few are no measure of the light, of which dark and white images tell.
+#[test]
+fn dark_and_white_images_that_are_not_applied_are_told_of() {
+    let mut picture = tilted(9, 6, 0.4).render(0);
+    let told = |picture: &Picture| {
+        let dark = Picture { pixels: vec![1.0; picture.pixels.len()], ..picture.clone() };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("dark.png");
+        let bytes = dark.pixels.iter().map(|v| *v as u8).collect();
+        image::GrayImage::from_raw(640, 480, bytes).unwrap().save(&path).unwrap();
+        let field = FlatField::from_images(&[path], &[], None).unwrap().unwrap();
+        let seen = detect_series(&["1.png".into()], &plate(9, 6), |_| field.apply(picture.clone()), |_| {}).remove(0);
+        assert!(seen.detection.observations.len() >= 50, "{:?}", seen.detection.failure);
+        seen.detection.notices.iter().any(|n| n.code == Code::FlatFieldLeftOut)
+    };
+    let of_many_levels = told(&picture);
+    picture.pixels.iter_mut().for_each(|v| *v = if *v < 110.0 { 0.0 } else { 255.0 });
+    assert_eq!((of_many_levels, told(&picture)), (false, true));
 }
 
 /// One pixel in a thousand at full scale.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 use robotcal::assess::Limits;
+use robotcal::error::Code;
 use robotcal::model::circle::centroid_uv;
 use robotcal::series::{Edge, read_images};
 use robotcal::simulate::truth::Truth;
@@ -29,6 +30,35 @@ fn an_image_and_its_copy_show_the_same() {
     let rescued = seen[4].detection.circles.iter().flat_map(|c| &c.found).filter(|f| f.measured.visible < 0.97).count();
     assert!(rescued > 0, "the second pass found nothing");
     assert_eq!(seen[4].detection.observations, seen[5].detection.observations);
+}
+
+/// Markers brighter than the ground are looked for in the negative, in the second pass as in the first.
+#[test]
+fn the_second_pass_finds_as_many_bright_markers_as_dark_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    copied(&Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/kr6_small"), folder.path());
+    let table = folder.path().join("joints.csv");
+    let rows = std::fs::read_to_string(&table).unwrap();
+    std::fs::write(&table, rows.lines().take(7).collect::<Vec<_>>().join("\n") + "\n").unwrap();
+    let seen = || {
+        let series = read_images(folder.path()).unwrap();
+        robotcal::identify::detect_stops(&series, &Limits::default(), |_| ()).unwrap().images
+    };
+    let dark = seen();
+    for image in &dark {
+        let path = image.path.as_ref().unwrap();
+        let mut picture = image::open(path).unwrap();
+        picture.invert();
+        picture.save(path).unwrap();
+    }
+    let rescued = |images: &[robotcal::identify::SeenImage]| {
+        let circles = images.iter().filter_map(|i| i.detection.circles.as_ref());
+        circles.flat_map(|c| &c.found).filter(|f| f.measured.visible < 0.97).count()
+    };
+    let bright = seen();
+    println!("{} of dark and {} of bright markers", rescued(&dark), rescued(&bright));
+    assert!(rescued(&dark) > 0 && rescued(&bright) == rescued(&dark));
+    assert!(bright.iter().all(|i| i.detection.notices.iter().any(|n| n.code == Code::MarkersBright)));
 }
 
 /// Half of a squared normalised error of two coordinates is exponentially distributed, with the median ln 2; what is allowed

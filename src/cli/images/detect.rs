@@ -154,7 +154,7 @@ fn write(args: &DetectArgs, looked: &Looked, place: ResultFolder) -> Result<usiz
 fn draw(looked: &Looked, drawable: &[(&SeenImage, &PathBuf, &String)], result: &NewResult) -> Result<()> {
     let palette = Palette::of(&looked.images);
     let corrected = looked.series.as_ref().map(|s| pictures(s, looked.flat_field.as_ref()));
-    let picture = |path: &Path| corrected.as_ref().map_or_else(|| load(path, None), |read| read(path));
+    let picture = |path: &Path| corrected.as_ref().map_or_else(|| load(path, None), |read| Ok(read(path)?.picture));
     let bar = progress::bar(drawable.len(), "drawing");
     drawable.par_iter().try_for_each(|(image, path, name)| {
         let drawn = overlay_png(&picture(path)?, image, &looked.plate, &palette)?;

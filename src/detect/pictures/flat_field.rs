@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::few_levels::few_levels;
 use super::flat_field_facts::{FlatFieldFacts, Light, block_means, drift};
+use super::loaded::Loaded;
 use crate::detect::{Picture, load};
 use crate::error::{Code, Error, Result};
 
@@ -72,14 +72,16 @@ impl FlatField {
     ///
     /// # Errors
     /// A picture of another size or depth than the dark and white images.
-    pub fn apply(&self, picture: Picture) -> Result<Picture> {
+    pub fn apply(&self, loaded: impl Into<Loaded>) -> Result<Loaded> {
+        let loaded = loaded.into();
+        let picture = &loaded.picture;
         if (picture.width, picture.height, picture.full_scale) != (self.width, self.height, self.full_scale) {
             return Err(Error::new(
                 Code::ImageSizeDiffers,
                 "image",
                 format!(
                     "is {}, but the dark and white images are {} x {} px up to {}",
-                    kind(&picture),
+                    kind(picture),
                     self.width,
                     self.height,
                     self.full_scale
@@ -87,8 +89,8 @@ impl FlatField {
                 "record dark and white images with the camera and the settings of the series, or remove their folders",
             ));
         }
-        if few_levels(&picture).is_some() {
-            return Ok(picture);
+        if loaded.few_levels.is_some() {
+            return Ok(Loaded { is_uncorrected: true, ..loaded });
         }
         let corrected = |k: usize| {
             let (raw, gain) = (picture.pixels[k], self.gain[k]);
@@ -114,7 +116,7 @@ impl FlatField {
                 })
             })
             .collect();
-        Ok(Picture { pixels, ..picture })
+        Ok(Loaded { picture: Picture { pixels, ..loaded.picture }, ..loaded })
     }
 }
 

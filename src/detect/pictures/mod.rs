@@ -6,4 +6,5 @@ pub(super) mod flat_field;
 pub(super) mod flat_field_facts;
 pub(super) mod hot_pixels;
 pub(super) mod load;
+pub(super) mod loaded;
 pub(super) mod picture;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::second_pass::second_pass;
 use super::seen_image::SeenImage;
 use crate::assess::Limits;
-use crate::detect::{FlatField, FlatFieldFacts, LightDrift, Picture, SeriesImage, detect_series, load};
+use crate::detect::{FlatField, FlatFieldFacts, LightDrift, Loaded, SeriesImage, detect_series, load};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::{Plate, Series, Source};
 
@@ -48,13 +48,13 @@ pub fn detect_stops(series: &Series, limits: &Limits, progress: impl Fn(&Path) +
 pub fn pictures<'a>(
     series: &Series,
     flat_field: Option<&'a FlatField>,
-) -> impl Fn(&Path) -> Result<Picture> + Sync + use<'a> {
+) -> impl Fn(&Path) -> Result<Loaded> + Sync + use<'a> {
     let bits = series.manifest.camera().bits;
     move |path: &Path| {
         let picture = load(path, bits)?;
         match flat_field {
             Some(flat_field) => flat_field.apply(picture),
-            None => Ok(picture),
+            None => Ok(picture.into()),
         }
     }
 }

@@ -10,7 +10,7 @@ use super::seen_image::SeenImage;
 use super::stated::{lens_of, measured_series};
 use crate::assess::Limits;
 use crate::detect::circles::Predicted;
-use crate::detect::{Picture, examine_predicted};
+use crate::detect::{Loaded, examine_predicted};
 use crate::error::Result;
 use crate::geom::Pose;
 use crate::identify::photogrammetry::camera_start::CameraStart;
@@ -32,7 +32,7 @@ pub(super) fn second_pass(
     series: &Series,
     images: &mut [SeenImage],
     limits: &Limits,
-    picture: impl Fn(&Path) -> Result<Picture> + Sync,
+    picture: impl Fn(&Path) -> Result<Loaded> + Sync,
 ) {
     if !series.plate.kind.print().is_predicted {
         return;
@@ -41,7 +41,7 @@ pub(super) fn second_pass(
     images.par_iter_mut().zip(poses).for_each(|(image, pose)| {
         let (Some(pose), Some(path)) = (pose, &image.path) else { return };
         let predicted = predict(&state, &series.plate, image, &pose);
-        if let Ok(picture) = picture(path).as_ref() {
+        if let Ok(picture) = picture(path) {
             examine_predicted(picture, &mut image.detection, &predicted);
         }
     });

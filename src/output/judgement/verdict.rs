@@ -103,6 +103,7 @@ fn is_information(code: Code) -> bool {
         Code::CovariatesUnused
             | Code::DictionaryGuessed
             | Code::FewGreyLevels
+            | Code::FlatFieldLeftOut
             | Code::HotPixels
             | Code::ImageDelayFound
             | Code::ImageDelayUnchecked
