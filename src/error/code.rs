@@ -130,6 +130,7 @@ codes! {
         UrdfAngleUnit "urdf_angle_unit" "angles exceed a full turn: degrees for radians?",
         UrdfLengthUnit "urdf_length_unit" "links are too long: millimetres for metres?",
         UrdfAxis "urdf_axis" "the axis of a joint is zero, missing or not of unit length",
+        UrdfUnlimited "urdf_unlimited" "a joint states no limits: what counts as its range is assumed",
         UrdfLimits "urdf_limits" "the limits of a joint leave no room to move",
         UrdfMassPlaceholder "urdf_mass_placeholder" "all links have one mass: a placeholder",
         UrdfMassesMissing "urdf_masses_missing" "gravity is to be taken into account, and the links have no masses",

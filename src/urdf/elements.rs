@@ -264,10 +264,11 @@ fn limits(
     if !matches!(read.joint_type, JointType::Revolute | JointType::Prismatic) {
         return None;
     }
-    let element = child(node, "limit")?;
-    if !element.has_attribute("lower") && !element.has_attribute("upper") {
+    let states = |element: &Node<'_, '_>| element.has_attribute("lower") || element.has_attribute("upper");
+    let Some(element) = child(node, "limit").filter(states) else {
+        notices.extend(read.mimic.is_none().then(|| unlimited(read, place())));
         return None;
-    }
+    };
     let bound = |key: &str| element.attribute(key).and_then(|v| numbers(v, 1)).map_or(0.0, |v| v[0]);
     let (lower, upper) = (bound("lower"), bound("upper"));
     if lower < upper {
@@ -283,6 +284,19 @@ fn limits(
     let what = format!("its limits, lower {lower} and upper {upper}, leave no room to move and are not used");
     notices.push(Notice::new(Code::UrdfLimits, place(), what, "correct the <limit>"));
     None
+}
+
+/// What counts as the range of a joint that states none.
+fn unlimited(read: &urdf_rs::Joint, place: String) -> Notice {
+    let range = match read.joint_type {
+        JointType::Prismatic => "0.5 m (3.14 m where a posture is looked for)",
+        _ => "half a turn",
+    };
+    let what = format!(
+        "states no limits, which URDF demands of it: where its range counts, {range} to both sides of zero is taken"
+    );
+    let remedy = "write <limit lower=\"...\" upper=\"...\"/>, or type=\"continuous\" where it turns without end";
+    Notice::new(Code::UrdfUnlimited, place, what, remedy)
 }
 
 /// First child element of that name.

@@ -274,7 +274,27 @@ fn defaults_that_were_never_written_are_not_invented() {
     let noticed = |inner: &str| robot(&wrap(&["a", "b"], &[joint("j", "revolute", "a", "b", inner)])).notices;
     assert_eq!(noticed("")[0].code, Code::UrdfAxis);
     assert_eq!(noticed(&format!("{Z}<origin rpy=\"90 0 0\"/>"))[0].code, Code::UrdfAngleUnit);
-    assert!(noticed(&format!("{Z}<origin rpy=\"1.57 0 0\"/>")).is_empty());
+    let limited = limit("lower=\"-1\" upper=\"1\"");
+    assert!(noticed(&format!("{limited}<origin rpy=\"1.57 0 0\"/>")).is_empty());
+}
+
+#[test]
+fn a_joint_without_limits_is_told_of_and_one_that_follows_another_is_not() {
+    let limit = |attributes: &str| format!("<limit {attributes} effort=\"0\" velocity=\"0\"/>");
+    let limited = joint("i", "revolute", "a", "b", &format!("{Z}{}", limit("lower=\"-1\" upper=\"1\"")));
+    let follows = "<mimic joint=\"i\"/>";
+    for (kind, inner, told) in [
+        ("revolute", String::new(), true),
+        ("prismatic", String::new(), true),
+        ("revolute", limit(""), true),
+        ("revolute", limit("upper=\"1\""), false),
+        ("continuous", String::new(), false),
+        ("revolute", follows.to_owned(), false),
+    ] {
+        let joints = [limited.clone(), joint("j", kind, "b", "c", &format!("{Z}{inner}"))];
+        let codes: Vec<Code> = robot(&wrap(&["a", "b", "c"], &joints)).notices.iter().map(|n| n.code).collect();
+        assert_eq!(codes, vec![Code::UrdfUnlimited; usize::from(told)], "{kind} {inner}");
+    }
 }
 
 #[test]

@@ -122,5 +122,6 @@ fn is_information(code: Code) -> bool {
             | Code::RepeatabilityUnused
             | Code::SecondArmRenamed
             | Code::TipChosen
+            | Code::UrdfUnlimited
     )
 }
