@@ -28,7 +28,7 @@ pub use pictures::flat_field_facts::{FlatFieldFacts, LightDrift};
 pub use pictures::load::{load, load_bytes};
 pub use pictures::loaded::Loaded;
 pub use pictures::picture::Picture;
-pub use run::{SeriesImage, detect_series};
+pub use run::{SeriesImage, detect_series, turned_by_viewers};
 
 use std::collections::BTreeSet;
 

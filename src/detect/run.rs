@@ -81,7 +81,6 @@ pub fn detect_series<P: Into<Loaded>>(
             }
         };
         name_image(&mut image.detection, path);
-        image.detection.notices.extend(is_turned_by_viewers(path).then(turned));
         image.detection.notices.extend(page_of(path).map(several_pages));
         image.detection.notices.extend((ink == Ink::Bright).then(bright));
         image
@@ -110,6 +109,7 @@ pub fn detect_series<P: Into<Loaded>>(
     note_unseen_tags(images, plate, &mut found);
     refuse_odd_sizes(images, &mut found);
     refuse_odd_dots(images, &mut found);
+    note_turned(images, &mut found);
     if !found.iter().any(shows) {
         name_other_kind(images, plate, &picture, &mut found);
     }
@@ -266,14 +266,22 @@ fn refuse_odd_sizes(images: &[PathBuf], found: &mut [SeriesImage]) {
     }
 }
 
-/// A camera does not turn when a viewer turns what it took.
-fn turned() -> Notice {
-    Notice::new(
-        Code::ImageTurned,
-        "image",
-        "its EXIF data ask viewers to turn or mirror it; its pixels are taken as they are stored, and so is the camera",
-        "read images so elsewhere, too (in OpenCV with IMREAD_IGNORE_ORIENTATION)",
-    )
+/// What is said of images that are turned or mirrored by viewers, with the first of them: a camera does not turn when a viewer turns what it took.
+pub fn turned_by_viewers(images: &[impl AsRef<Path>]) -> Option<(usize, Notice)> {
+    let turned: Vec<usize> = (0..images.len()).filter(|k| is_turned_by_viewers(images[*k].as_ref())).collect();
+    let what = format!(
+        "EXIF data of {} of {} images ask viewers to turn or mirror them; their pixels are taken as they are stored, and so is the camera",
+        turned.len(),
+        images.len()
+    );
+    let remedy = "read images so elsewhere, too (in OpenCV with IMREAD_IGNORE_ORIENTATION)";
+    turned.first().map(|first| (*first, Notice::new(Code::ImageTurned, "images", what, remedy)))
+}
+
+fn note_turned(images: &[PathBuf], found: &mut [SeriesImage]) {
+    if let Some((first, notice)) = turned_by_viewers(images) {
+        found[first].detection.notices.push(notice);
+    }
 }
 
 /// Previews, and stacks of images.

@@ -7,8 +7,10 @@ use crate::program::{robotcal, text};
 use crate::said::{Said, assert_says};
 use image::{DynamicImage, GrayImage, Luma};
 use robotcal::Code;
+use robotcal::assess::Limits;
 use robotcal::detect::{detect, detect_series, load};
-use robotcal::series::{Observation, Source, read};
+use robotcal::identify::{SeenImage, detect_stops};
+use robotcal::series::{Observation, Source, read, read_images};
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -155,6 +157,34 @@ fn doctor_tells_a_jpeg_that_was_cut_off_from_one_without_a_mark_of_its_end() {
     let cut_off: Vec<&str> = printed.split("\nnote ").filter(|n| n.contains(Code::ImageTruncated.name())).collect();
     assert!(cut_off.len() == 1 && cut_off[0].contains("img_002.jpg"), "{printed}");
     assert!(!printed.contains("img_000.jpg") && !printed.contains("img_001.jpg"), "{printed}");
+}
+
+/// What EXIF data ask of viewers is the same for all images of a camera.
+#[test]
+fn images_that_viewers_turn_are_told_of_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let images = ["img_000.png", "img_001.png", "img_002.png"];
+    let run1 = small_series(folder.path(), &images);
+    let joints = std::fs::read_to_string(run1.join("joints.csv")).unwrap();
+    std::fs::write(run1.join("joints.csv"), joints.replace(".png", ".jpg")).unwrap();
+    for name in images {
+        let path = run1.join("images").join(name);
+        let mut jpeg = std::io::Cursor::new(Vec::new());
+        image::open(&path).unwrap().to_luma8().write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+        let mut bytes = jpeg.into_inner();
+        // Half a turn.
+        let tag = [0x12, 0x01, 3, 0, 1, 0, 0, 0, 3, 0, 0, 0];
+        let exif = [b"Exif\0\0II*\0\x08\0\0\0\x01\0".as_slice(), &tag, &[0; 4]].concat();
+        bytes.splice(2..2, [0xff, 0xe1, 0, exif.len() as u8 + 2].into_iter().chain(exif));
+        std::fs::write(path.with_extension("jpg"), bytes).unwrap();
+        std::fs::remove_file(path).unwrap();
+    }
+    let doctor = robotcal(&["doctor", name(&run1)]);
+    let printed = String::from_utf8_lossy(&doctor.stdout);
+    assert_eq!(printed.matches(Code::ImageTurned.name()).count(), 1, "{printed}");
+    let seen = detect_stops(&read_images(&run1).unwrap(), &Limits::default(), |_| ()).unwrap().images;
+    let said = seen.iter().flat_map(SeenImage::notices).filter(|n| n.code == Code::ImageTurned);
+    assert_eq!(said.count(), 1);
 }
 
 #[test]

@@ -14,7 +14,7 @@ use crate::cli::flags::choices::ChoiceArgs;
 use crate::cli::flags::recording::RecordingArgs;
 use crate::cli::terminal::say::{say, say_line};
 use crate::cli::terminal::{progress, stages};
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::identify::{Estimator, Options, dry_run};
 use crate::output::solution_json::{FILE_NAME, TIMINGS};
 use crate::output::{Offsets, Poses, ResultFolder, folder_name, restore};
@@ -157,7 +157,7 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let noticed = observed.notices.clone();
     // A refusal says nothing of what was noticed before, which may be its cause.
     let calibration = Calibration::of(observed, &Options { estimator, ..options })
-        .inspect_err(|_| noticed.iter().for_each(|notice| tracing::warn!("{}", notice.coded())))?;
+        .inspect_err(|_| Notice::said_once(&noticed).iter().for_each(|n| tracing::warn!("{}", n.coded())))?;
     write(args, calibration, place, at.as_ref())
 }
 

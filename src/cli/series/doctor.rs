@@ -11,7 +11,7 @@ use crate::cli::Verdict;
 use crate::cli::flags::recording::RecordingArgs;
 use crate::cli::terminal::paragraph::paragraph;
 use crate::cli::terminal::say::say_line;
-use crate::detect::load;
+use crate::detect::{load, turned_by_viewers};
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{is_whole, picture_size, word};
 use crate::identify::{image_size, readings_of};
@@ -209,6 +209,7 @@ fn images(series: &Series, seen: &mut Examination) {
         seen.note(&Notice::new(Code::ImageSizeDiffers, "images", what, "they are left out"));
     }
 }
+    turned_by_viewers(&paths).iter().for_each(|(_, notice)| seen.note(notice));
 
 /// Of a picture that can be used: one without a mark of its end may have all of its rows, and is decoded.
 fn size_of(path: &Path) -> Result<(u32, u32)> {
