@@ -7,5 +7,6 @@ pub mod joint_terms;
 pub mod mdh;
 pub mod mirror;
 pub mod mount;
+pub mod one_direction;
 pub mod plate_modes;
 pub mod robot;

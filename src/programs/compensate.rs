@@ -381,7 +381,7 @@ impl<'a> Work<'a> {
                     let all: Vec<String> = all.map(|i| self.beyond(i, q[i])).collect();
                     Why::new(LeftReason::BeyondLimit, format!("it would take {}", all.join(" and ")))
                 }
-                _ => self.unreached(to.held, &stalled),
+                _ => self.unreached(to, wanted, (start, &stalled)),
             }
         })?;
         let (i, change) = largest_change(start, &found);
@@ -394,15 +394,17 @@ impl<'a> Work<'a> {
         Ok(found)
     }
 
-    /// Why nothing reaches it: within the limits, fewer than six joints cannot move the tool in all directions.
-    fn unreached(&self, held: &[bool], stalled: &Stalled) -> Why {
+    /// Why nothing reaches it from a posture: within the limits, fewer than six joints cannot move the tool in all directions.
+    fn unreached(&self, to: &Reach<'_>, wanted: &Pose, (start, stalled): (&[f64], &Stalled)) -> Why {
         let remain = twist_in_words(&stalled.error);
-        let free = || held.iter().enumerate().filter(|(_, held)| !**held).map(|(i, _)| i);
+        let free = || to.held.iter().enumerate().filter(|(_, held)| !**held).map(|(i, _)| i);
         let (axes, q) = (free().count(), &stalled.readings);
         let is_within = free().all(|i| q[i] > self.limits[i].0 && q[i] < self.limits[i].1);
         if axes < 6 && is_within {
+            let (turn_rad, shift_m) = to.robot.pose_at(&to.stop(start), &vec![0.0; start.len()]).distance(wanted);
+            let errors = in_words(shift_m, turn_rad);
             let words = format!(
-                "{axes} joints that may move cannot take out all six errors of the tool: {remain} would remain (level foot and tool so that less of it is left, or teach this target on the real robot)"
+                "{axes} joints that may move cannot take out all six errors of the tool: of {errors}, {remain} would remain, so that nothing of it is corrected (level foot and tool so that less of it is left, or teach this target on the real robot)"
             );
             return Why::new(LeftReason::TooFewAxes, words);
         }

@@ -4,9 +4,11 @@ use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, RngExt};
 
 use super::request::WorldRequest;
+use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::inverse;
+use crate::model::one_direction::turns_about_one_direction;
 use crate::model::robot::Robot;
 use crate::plan::viewpoint::Viewpoint;
 use crate::series::CameraMount;
@@ -135,14 +137,25 @@ fn best(
         }
     }
     if (winner.0 as f64) < LEAST_SHARE * TRIALS as f64 {
-        return Err(Error::new(
-            Code::SimulationOutOfReach,
-            format!("robot {}", request.chain.robot),
-            "hardly any view of the plate is in reach, wherever the plate stands",
-            "allow nearer views, or choose a plate that suits the robot's size",
-        ));
+        return Err(out_of_reach(robot));
     }
     Ok(winner.1)
+}
+
+fn out_of_reach(robot: &Robot) -> Error {
+    let is_level = turns_about_one_direction(robot, Limits::default().hand_eye_rotation_rad);
+    let (what, remedy) = if is_level {
+        (
+            "it turns its flange about one direction alone: no camera or plate on it is tilted, as images that tell the hand-eye transform ask for",
+            "measure such an arm with a tracker (points.csv, poses.csv) or by touches (contacts.csv); only images are simulated",
+        )
+    } else {
+        (
+            "hardly any view of the plate is in reach, wherever the plate stands",
+            "allow nearer views, or choose a plate that suits the robot's size",
+        )
+    };
+    Error::new(Code::SimulationOutOfReach, format!("robot {}", robot.chain.robot), what, remedy)
 }
 
 impl Setup {

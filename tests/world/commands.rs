@@ -66,6 +66,37 @@ fn wrong_wishes_of_a_simulation_are_refused() {
     }
 }
 
+/// Rods keep the flange of a palletiser level: nearer views are no help.
+#[test]
+fn an_arm_that_tilts_nothing_is_told_what_measures_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let joint = |name: &str, [parent, child]: [&str; 2], xyz: &str, inner: &str| {
+        format!(
+            "<link name=\"{child}\"/><joint name=\"{name}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+             <origin xyz=\"{xyz}\"/>{inner}<limit lower=\"-1.5\" upper=\"1.5\" effort=\"0\" velocity=\"0\"/></joint>"
+        )
+    };
+    let (z, y) = ("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"0 1 0\"/>");
+    let follows = |of: &str| format!("{y}<mimic joint=\"{of}\" multiplier=\"-1\"/>");
+    let urdf = folder.path().join("palletiser.urdf");
+    let joints = [
+        joint("j1", ["base", "a"], "0 0 0.4", z),
+        joint("j2", ["a", "b"], "0.1 0 0", y),
+        joint("j3", ["b", "c"], "0 0 0.6", y),
+        joint("rod2", ["c", "d"], "0.6 0 0", &follows("j2")),
+        joint("rod3", ["d", "e"], "0 0 0", &follows("j3")),
+        joint("j4", ["e", "f"], "0.1 0 -0.1", z),
+    ];
+    std::fs::write(&urdf, format!("<robot name=\"p\"><link name=\"base\"/>{}</robot>", joints.concat())).unwrap();
+    let out = folder.path().join("series");
+    let output =
+        robotcal(&["simulate", "--urdf", urdf.to_str().unwrap(), "--out", out.to_str().unwrap(), "--observations"]);
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output));
+    let said = text(&output);
+    let code = Code::SimulationOutOfReach;
+    assert!(said.contains(&format!("error[{code}]: ")) && said.contains("contacts.csv"), "{said}");
+}
+
 fn root(path: &str) -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path).to_str().unwrap().to_owned()
 }

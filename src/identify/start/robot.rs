@@ -17,11 +17,12 @@ use crate::init::{
 };
 use crate::linalg::median;
 use crate::linalg::symmetric_eigen;
+use crate::model::one_direction::turns_about_one_direction;
 use crate::model::robot::Robot;
 use crate::problem::{
     Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
 };
-use crate::urdf::{BASE_FROM_BASE, JointKind};
+use crate::urdf::BASE_FROM_BASE;
 
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
@@ -333,6 +334,10 @@ fn pixels(problem: &Problem, state: &State, image: usize) -> Option<f64> {
     Some((sum / f64::max(count, 1.0)).sqrt())
 }
 
+/// What an arm that tilts nothing can do.
+const ONE_DIRECTION: &str = "this arm turns its flange about one direction alone, so that its images tell neither the hand-eye transform nor the plate: \
+     measure it with a tracker (points.csv, poses.csv) or by touches (contacts.csv)";
+
 /// Hand-camera and plate pose need rotations about at least two axes.
 fn check_rotations(of: &str, poses: &[PosePair], robot: &Robot, limits: &Limits) -> Result<()> {
     let mut m = nalgebra::DMatrix::<f64>::zeros(3, 3);
@@ -367,23 +372,11 @@ fn check_rotations(of: &str, poses: &[PosePair], robot: &Robot, limits: &Limits)
             largest.to_degrees(),
             second.to_degrees()
         ),
-        match turns_about_one_direction(robot, limits) {
-            true => {
-                "all joints of this arm turn about one direction, so that its images tell neither the hand-eye transform nor the plate: measure it \
-                 with a tracker (points.csv, poses.csv) or by touches (contacts.csv)"
-            }
+        match turns_about_one_direction(robot, limits.hand_eye_rotation_rad) {
+            true => ONE_DIRECTION,
             false => "move the wrist: tilt the camera by 20 to 45 degrees to all sides and roll it between the images",
         },
     ))
-}
-
-/// True for an arm such as a SCARA, whose axes are all parallel: no posture of it tilts what it carries.
-fn turns_about_one_direction(robot: &Robot, limits: &Limits) -> bool {
-    let chain = &robot.chain;
-    let at_zero = robot.link_poses(&vec![0.0; chain.readings.len()]);
-    let turning = chain.joints.iter().zip(&at_zero).filter(|(joint, _)| joint.kind == JointKind::Revolute);
-    let axes: Vec<_> = turning.map(|(joint, pose)| pose.rotation * joint.axis).collect();
-    axes.iter().all(|axis| axis.cross(&axes[0]).norm() < limits.hand_eye_rotation_rad)
 }
 
 fn set_aside(problem: &mut Problem, pairs: &[(usize, PosePair)], solution: &HandEye, limits: &Limits) -> Vec<usize> {
@@ -425,36 +418,4 @@ pub(in crate::identify) fn take_back(
     let back: Vec<usize> = aside.iter().copied().filter(|i| is_out(i) && fits(i)).collect();
     back.iter().for_each(|&i| adjustment.problem.images[i].rejected = None);
     !back.is_empty()
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use super::*;
-    use crate::urdf::RobotDescription;
-
-    #[test]
-    fn an_arm_of_parallel_axes_tilts_nothing() {
-        let tilts = |axis: &str, rpy: &str| {
-            let joint = |name: &str, kind: &str, ends: [&str; 2], axis: &str, rpy: &str| {
-                format!(
-                    "<link name='{1}'/><joint name='{name}' type='{kind}'><parent link='{0}'/><child link='{1}'/>\
-                     <origin xyz='0.3 0 0' rpy='{rpy}'/><axis xyz='{axis}'/>\
-                     <limit lower='-1' upper='1' effort='0' velocity='0'/></joint>",
-                    ends[0], ends[1]
-                )
-            };
-            let text = format!(
-                "<robot name='r'><link name='base'/>{}{}{}</robot>",
-                joint("j1", "revolute", ["base", "a"], "0 0 1", "0 0 0"),
-                joint("j2", "prismatic", ["a", "b"], "1 0 0", "0 0 0"),
-                joint("j3", "revolute", ["b", "c"], axis, rpy)
-            );
-            let chain = RobotDescription::from_text(Path::new("r.urdf"), text).and_then(|d| d.chain(None, None));
-            !turns_about_one_direction(&Robot::nominal(chain.unwrap()), &Limits::default())
-        };
-        assert!(!tilts("0 0 1", "0 0 0.5") && !tilts("0 0 -1", "3.14159265 0 0"));
-        assert!(tilts("0 1 0", "0 0 0") && tilts("0 0 1", "1.5 0 0"));
-    }
 }
