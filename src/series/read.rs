@@ -123,21 +123,28 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     let mut series =
         Series { name, folder, manifest, plate, stops, source, controller, spatial, run: None, notices, inputs };
     if by_cameras {
-        refuse_spatial(&series)?;
-        series.source = Source::Cameras(views_of(&mut series, use_observations)?);
+        let mut views = views_of(&mut series, use_observations)?;
+        views.extend(measured_in_space(&series, &views));
+        series.source = Source::Cameras(views);
     }
     Ok(series)
 }
 
-/// Measurements of trackers and contacts have no place among the views of several cameras yet.
-fn refuse_spatial(series: &Series) -> Result<()> {
-    if series.spatial.is_empty() {
-        return Ok(());
-    }
-    let what = "points.csv, poses.csv and contacts.csv are not read yet beside images.csv";
-    let remedy =
-        "put them with their rows of joints.csv into a series folder of their own, and give both with --series";
-    Err(Error::new(Code::SettingUnsupported, series.folder.display(), what, remedy))
+/// What trackers and contacts measured at the stops of the cameras: a view of all stops, without images.
+fn measured_in_space(series: &Series, views: &[Series]) -> Option<Series> {
+    let is_taken = views.iter().any(|view| view.name == series.name);
+    let name = if is_taken { format!("{} in space", series.name) } else { series.name.clone() };
+    let rows = (0..series.stops.stops.len()).collect();
+    let has_mixed_mounts = has_mixed_mounts(&series.manifest);
+    let run = Some(Run { name: series.name.clone(), has_mixed_mounts, rows });
+    (!series.spatial.is_empty()).then(|| Series {
+        name,
+        source: Source::NoImages,
+        run,
+        notices: Vec::new(),
+        inputs: Vec::new(),
+        ..series.clone()
+    })
 }
 
 /// The views of the cameras of a series, by its images.csv.

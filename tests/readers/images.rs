@@ -56,6 +56,19 @@ fn every_camera_is_a_view_of_the_same_stops() {
 }
 
 #[test]
+fn what_was_measured_in_space_is_a_view_of_the_same_stops_without_images() {
+    let points = ("points.csv", "stop,target,x_m,y_m,z_m\nthree,ball,0.1,0.2,0.3\n");
+    let folder = folder(&[points, ("contacts.csv", "stop,contact\none,cone\ntwo,cone\n")]);
+    let series = read(folder.path()).unwrap();
+    let [left, wrist, space] = series.views() else { panic!("{} views", series.views().len()) };
+    assert!(left.spatial.is_empty() && wrist.spatial.is_empty() && space.source == Source::NoImages);
+    assert_eq!((space.spatial.points[0].stop, space.spatial.contacts.len()), (2, 2));
+    assert_eq!(seen(space), [(0, "one"), (1, "two"), (2, "three")]);
+    assert!(space.run_name() == wrist.run_name() && space.name != wrist.name && space.name != left.name);
+    assert_eq!(series.image_hashes().unwrap().len(), 5);
+}
+
+#[test]
 fn a_bad_row_names_line_and_column() {
     let with = |from: &str, to: &str| refusal("images.csv", &IMAGES.replace(from, to));
     assert_says(&with("two,wrist,b1", "to,wrist,b1"), Code::StopUnknown, &["images.csv:5", "\"to\"", "\"two\""]);

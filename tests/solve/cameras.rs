@@ -7,7 +7,7 @@ use robotcal::identify::{JointNoise, Options, Selection, Solution, identify};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::Robot;
 use robotcal::output::{self, restore, solution_json};
-use robotcal::problem::{LensChoice, MeasuredSeries, MeasuredStop, PlateShape};
+use robotcal::problem::{BodySeen, InstrumentKind, LensChoice, MeasuredSeries, MeasuredStop, PlateShape, SeenBody};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 
 use crate::outputs_support::{context, robot, scene};
@@ -249,6 +249,52 @@ fn a_record_keeps_which_images_are_of_one_stop() {
         let rows = |s: &MeasuredSeries| s.stops.iter().map(|s| (s.row, s.image.clone())).collect::<Vec<_>>();
         assert_eq!(rows(was), rows(is));
     }
+}
+
+/// A tracker that saw a ball at the stops of a camera knows of the same joint errors.
+#[test]
+fn what_a_tracker_measured_at_the_stops_of_a_camera_shares_its_joint_errors() {
+    let mut seen = seen(&MIXTURES[0][..1], 30, 61);
+    let nominal = Robot::nominal(robot().chain(None, None).unwrap());
+    let mut dice = Dice::new(62);
+    let sigma_m = 2e-5;
+    let ball = Vector3::new(0.03, -0.02, 0.1);
+    let point = |(stop, own): (usize, &MeasuredStop)| {
+        let readings = own.readings.as_ref().unwrap();
+        let moved: Vec<f64> = readings.iter().zip(&seen.joint_errors[own.row]).map(|(q, e)| q + e).collect();
+        let place = nominal.base_from_tip(&moved).transform(&ball);
+        SeenBody {
+            stop,
+            instrument: "tracker".into(),
+            kind: InstrumentKind::Tracker,
+            body: "ball".into(),
+            seen: BodySeen::Point(place + Vector3::from_fn(|_, _| dice.normal(sigma_m))),
+            sigma_m,
+            sigma_rad: 1e-4,
+        }
+    };
+    let bodies: Vec<SeenBody> = seen.series[0].stops.iter().enumerate().map(point).collect();
+    let stops = seen.series[0].stops.iter().map(|stop| MeasuredStop {
+        observations: Vec::new().into(),
+        image: format!("stop {}", stop.row),
+        ..stop.clone()
+    });
+    let space = MeasuredSeries::without_images("run", true, stops.collect());
+    seen.series.push(MeasuredSeries { run: Some("run".into()), bodies, ..space });
+    let solution = solved(&seen);
+    let problem = &solution.fit.problem;
+    assert_eq!((problem.stops.len(), problem.images.len(), problem.body_measurements.len()), (30, 30, 30));
+    let nees = normalised(&seen, &solution);
+    assert!((0.6..1.6).contains(&nees), "{nees}");
+    let description = robot();
+    let mut context = context(&description);
+    context.series = seen.series.iter().map(|s| s.name.clone()).collect();
+    let files = output::files(&solution, &context).unwrap();
+    let again = restore::measured_series(&solution_json::read(&files["solution.json"]).unwrap()).unwrap();
+    let (was, is) = (&seen.series[1], &again[1]);
+    assert_eq!((&was.run, &was.name, was.bodies.len()), (&is.run, &is.name, is.bodies.len()));
+    let rows = |s: &MeasuredSeries| s.stops.iter().map(|s| s.row).collect::<Vec<_>>();
+    assert_eq!(rows(was), rows(is));
 }
 
 #[test]

@@ -138,7 +138,8 @@ fn examine(series: Series, args: &DoctorArgs, options: &RecordingOptions, seen: 
         Source::Recording(_) => {}
         Source::Observations(all) => seen.good("observations.csv", &format!("{} images", all.len())),
         Source::Cameras(views) => {
-            seen.good("images.csv", &format!("{} cameras at the same stops", views.len()));
+            let cameras = views.iter().filter(|view| view.source != Source::NoImages).count();
+            seen.good("images.csv", &format!("{cameras} cameras at the same stops"));
             views
                 .iter()
                 .filter(|view| matches!(view.source, Source::Images { .. }))
@@ -208,8 +209,8 @@ fn images(series: &Series, seen: &mut Examination) {
         let what = format!("{others} images have another size than {width} x {height} px");
         seen.note(&Notice::new(Code::ImageSizeDiffers, "images", what, "they are left out"));
     }
-}
     turned_by_viewers(&paths).iter().for_each(|(_, notice)| seen.note(notice));
+}
 
 /// Of a picture that can be used: one without a mark of its end may have all of its rows, and is decoded.
 fn size_of(path: &Path) -> Result<(u32, u32)> {

@@ -176,7 +176,9 @@ fn without_images(series: &Series, readings: Vec<Option<Vec<f64>>>) -> MeasuredS
         left_out: None,
     };
     let stops = series.stops.stops.iter().zip(readings).enumerate().map(of).collect();
-    MeasuredSeries::without_images(&series.name, series.manifest.robot.order == StopOrder::Visited, stops)
+    let run = series.run.as_ref().map(|run| run.name.clone());
+    let order_known = series.manifest.robot.order == StopOrder::Visited;
+    MeasuredSeries { run, ..MeasuredSeries::without_images(&series.name, order_known, stops) }
 }
 
 /// Name of a placement: the default one is that of its series alone, and a plate on the tip is not one in the cell.

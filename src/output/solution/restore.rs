@@ -119,7 +119,7 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
         let (bodies, lengths) = (record.bodies.seen(&s.name), record.bodies.seen_lengths(&s.name));
         if !s.has_images {
             let own = MeasuredSeries::without_images(&s.name, s.order_known, record.bodies.stops_of(&s.name));
-            return Ok(MeasuredSeries { bodies, lengths, ..own });
+            return Ok(MeasuredSeries { run: s.run.clone(), bodies, lengths, ..own });
         }
         let of_plate = || damaged(format!("series {} has no plate", s.name));
         let stops = record.images.iter().filter(|i| i.series == s.name).enumerate();
