@@ -210,8 +210,8 @@ codes! {
         ImagePages "image_pages" "an image file holds several pages, of which one is taken",
         ImageTurned "image_turned" "viewers turn or mirror an image as its EXIF data ask; here pixels are as the sensor gave them",
         FlatFieldDrift "flat_field_drift" "dark or white images of the end differ from those of the begin",
-        FlatFieldUseless "flat_field_useless" "white images are saturated, or not brighter than dark ones",
         FlatFieldLeftOut "flat_field_left_out" "dark and white images are not applied to an image of few grey levels",
+        FlatFieldUseless "flat_field_useless" "white images are saturated, or not brighter than dark ones",
     }
     Input "Detection" {
         PlateNotFound "plate_not_found" "nothing in the image looks like the plate",
