@@ -122,6 +122,16 @@ pub(super) fn positions(files: &Files) -> Vec<Vector3<f64>> {
     rows(files, "plate.csv").iter().map(|row| place(row).into()).collect()
 }
 
+/// What the command in the head of a file publishes.
+fn published(files: &Files, name: &str) -> (String, String, Pose) {
+    let line = text(files, name).lines().find_map(|l| l.strip_prefix("# ros2 run tf2_ros static_transform_publisher "));
+    let words: Vec<&str> = line.unwrap().split(' ').collect();
+    let of = |flag: &str| words[words.iter().position(|w| *w == flag).unwrap() + 1];
+    let number = |flag: &str| of(flag).parse::<f64>().unwrap();
+    let (xyz, quaternion) = (["--x", "--y", "--z"].map(number), ["--qx", "--qy", "--qz", "--qw"].map(number));
+    (of("--frame-id").into(), of("--child-frame-id").into(), Pose::from_xyz_quaternion(xyz, quaternion))
+}
+
 #[test]
 fn files_chained_by_their_frames_give_the_camera_pose_of_the_solver() {
     for mount in [CameraMount::Hand, CameraMount::Fixed] {
@@ -132,6 +142,12 @@ fn files_chained_by_their_frames_give_the_camera_pose_of_the_solver() {
         for pose in [&camera, &plate] {
             assert!(pose.pose().distance(&Pose::from_xyz_rpy(pose.xyz_m, pose.rpy_rad)).0 < 1e-12);
             assert_covariance(&Matrix6::from_row_slice(&pose.covariance), &pose.child);
+        }
+        for (name, pose) in [("hand_camera.yaml", &camera), ("plate_pose.yaml", &plate)] {
+            let (parent, child, published) = published(&files, name);
+            assert_eq!((&parent, &child), (&pose.parent, &pose.child));
+            let (angle, distance) = published.distance(&pose.pose());
+            assert!(angle < 1e-9 && distance < 1e-9, "{name}: {angle:e} {distance:e}");
         }
         let chain = reread_chain(&files);
         assert_eq!((camera.child.as_str(), plate.child.as_str()), ("front", "plate"));

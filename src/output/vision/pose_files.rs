@@ -2,6 +2,7 @@
 
 use nalgebra::Matrix6;
 
+use crate::files::word;
 use crate::fit::{FreePoses, PlacedCamera};
 use crate::geom::Pose;
 use crate::identify::Solution;
@@ -29,6 +30,10 @@ const OPTICAL: &str = "\
 # The camera frame is optical: z forward, x right, y down.
 ";
 
+const TO_ROS: &str = "\
+# In ROS 2 this command publishes it (the name of the child is free to choose):
+";
+
 struct PoseFile<'a> {
     parent: &'a str,
     child: &'a str,
@@ -41,8 +46,9 @@ impl PoseFile<'_> {
     fn text(&self) -> String {
         let c = &self.covariance;
         format!(
-            "{PERTURBATION}{}parent: {}\nchild: {}\nxyz_m: {}\nquat_xyzw: {}\nrpy_rad: {}\ncovariance: {}\n",
+            "{PERTURBATION}{}{TO_ROS}# {}\nparent: {}\nchild: {}\nxyz_m: {}\nquat_xyzw: {}\nrpy_rad: {}\ncovariance: {}\n",
             self.remark,
+            self.publisher(),
             quoted(self.parent),
             quoted(self.child),
             list(self.pose.xyz()),
@@ -50,6 +56,16 @@ impl PoseFile<'_> {
             list(self.pose.rpy()),
             list((0..36).map(|k| 0.5 * (c[(k / 6, k % 6)] + c[(k % 6, k / 6)]))),
         )
+    }
+
+    /// The command by which ROS 2 publishes the pose to tf: `child` in `parent`, quaternion with its scalar last.
+    fn publisher(&self) -> String {
+        let [x, y, z] = self.pose.xyz();
+        let [qx, qy, qz, qw] = self.pose.quaternion_xyzw();
+        let numbers = [("x", x), ("y", y), ("z", z), ("qx", qx), ("qy", qy), ("qz", qz), ("qw", qw)];
+        let numbers = numbers.map(|(name, value)| format!("--{name} {value:?}")).join(" ");
+        let (parent, child) = (word(self.parent), word(self.child));
+        format!("ros2 run tf2_ros static_transform_publisher {numbers} --frame-id {parent} --child-frame-id {child}")
     }
 }
 
