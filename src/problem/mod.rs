@@ -9,6 +9,7 @@ mod body_chain;
 mod bounds;
 mod condensed;
 mod equations;
+mod exposures;
 mod family;
 mod given;
 mod image;
@@ -38,6 +39,7 @@ pub use body::{BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, 
 pub use bounds::Bounds;
 pub use condensed::{SeenAtStop, by_columns, condensed};
 pub use equations::{E, Equations, MarkerCoupling, MarkerTerms, Sight};
+pub use exposures::Exposures;
 pub use family::Family;
 pub use given::{HUBER, Problem, TakenBodies};
 pub use image::Image;

@@ -143,6 +143,11 @@ fn a_model_that_misses_more_than_its_solution_states_is_not_trusted() {
 
 /// The same stops of the same robot, measured again.
 fn measured_again(series: &Path, into: &Path) -> PathBuf {
+    observations_rewritten(series, into, 1e-3)
+}
+
+/// A series with `u` of its observations moved to and fro by so much, px, and with other bytes in each of its files of measurements.
+fn observations_rewritten(series: &Path, into: &Path, by_px: f64) -> PathBuf {
     std::fs::create_dir(into).unwrap();
     for entry in std::fs::read_dir(series).unwrap().map(Result::unwrap) {
         std::fs::copy(entry.path(), into.join(entry.file_name())).unwrap();
@@ -153,11 +158,11 @@ fn measured_again(series: &Path, into: &Path) -> PathBuf {
     let seen_again = |(k, row): (usize, &str)| {
         let mut fields: Vec<String> = row.split(',').map(str::to_owned).collect();
         let u: f64 = fields[column].parse().unwrap();
-        fields[column] = (u + if k % 2 == 0 { 1e-3 } else { -1e-3 }).to_string();
+        fields[column] = (u + if k % 2 == 0 { by_px } else { -by_px }).to_string();
         fields.join(",") + "\n"
     };
     let rows: String = rows.lines().enumerate().map(seen_again).collect();
-    std::fs::write(into.join("observations.csv"), format!("{head}\n{rows}")).unwrap();
+    std::fs::write(into.join("observations.csv"), format!("{head}\r\n{rows}")).unwrap();
     into.to_path_buf()
 }
 
@@ -217,7 +222,56 @@ fn the_series_that_a_model_was_fitted_to_proves_nothing() {
     let corrected = out.join("kuka_kr6_r900.calibrated.urdf");
     let own = verdict(&corrected, &series, &["--nominal", urdf]);
     assert_eq!((own.0, own.1), (Some(0), vec![Code::OwnMeasurement]));
+    // In a file of other bytes.
+    let rewritten = observations_rewritten(&series, &folder.path().join("rewritten"), 0.0);
+    let own = verdict(&corrected, &rewritten, &["--nominal", urdf]);
+    assert_eq!((own.0, own.1), (Some(0), vec![Code::OwnMeasurement]));
     let again = measured_again(&series, &folder.path().join("again"));
     let other = verdict(&corrected, &again, &["--nominal", urdf]);
     assert_eq!((other.0, other.1), (Some(0), vec![]));
+}
+
+/// Noise never puts a marker in the same place twice: a picture in another format is the same exposure.
+#[test]
+fn pictures_in_another_format_are_no_second_measurement() {
+    let nominal = kr6_urdf();
+    let folder = tempfile::tempdir().unwrap();
+    let [png, bmp, part] = ["png", "bmp", "part"].map(|name| folder.path().join(name));
+    let [urdf, of] = [&nominal, &png].map(|p| p.to_str().unwrap());
+    let simulated = ["simulate", "--urdf", urdf, "--out", of, "--images", "24", "--errors", "rigid"];
+    assert!(robotcal(&simulated).status.success());
+    let encoded = |into: &Path, count: usize| {
+        std::fs::create_dir_all(into.join("images")).unwrap();
+        for name in ["series.toml", "plate.toml", "plate.csv"] {
+            std::fs::copy(png.join(name), into.join(name)).unwrap();
+        }
+        let joints = std::fs::read_to_string(png.join("joints.csv")).unwrap();
+        let rows: Vec<&str> = joints.lines().take(count + 1).collect();
+        std::fs::write(into.join("joints.csv"), (rows.join("\n") + "\n").replace(".png", ".bmp")).unwrap();
+        for row in &rows[1..] {
+            let name = row.split(',').next().unwrap();
+            let picture = image::open(png.join("images").join(name)).unwrap();
+            picture.save(into.join("images").join(name.replace(".png", ".bmp"))).unwrap();
+        }
+    };
+    encoded(&bmp, 24);
+    encoded(&part, 8);
+    let [of_bmp, of_part] = [&bmp, &part].map(|p| p.to_str().unwrap());
+    let identify = |series: &[&str], out: &str| {
+        let into = folder.path().join(out);
+        let flags = ["identify", "--urdf", urdf, "--robot-model", "rigid", "--out", into.to_str().unwrap(), "--series"];
+        (robotcal(&[&flags[..], series].concat()), into)
+    };
+    let twice = identify(&[of, of_bmp], "twice").0;
+    let said = String::from_utf8_lossy(&twice.stderr).into_owned();
+    assert_eq!(twice.status.code(), Some(2), "{said}");
+    assert!(said.contains(&format!("error[{}]", Code::SeriesRepeated.name())), "{said}");
+    // A part of them is left out, and the result is that of the whole.
+    let (_, both) = identify(&[of, of_part], "both");
+    let solution: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(both.join("solution.json")).unwrap()).unwrap();
+    assert_eq!([&solution["statistics"]["images"], &solution["statistics"]["images_used"]], [32, 24]);
+    let (_, once) = identify(&[of], "once");
+    let judged = verdict(&once.join("kuka_kr6_r900.calibrated.urdf"), &bmp, &["--nominal", urdf]);
+    assert_eq!(judged.1, vec![Code::OwnMeasurement]);
 }

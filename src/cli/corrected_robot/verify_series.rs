@@ -109,7 +109,7 @@ fn weigh(args: &VerifyArgs, reasons: &mut Reasons, model: &Model, measured: Meas
     let expected = stated.as_ref().and_then(|s| Some((s, s.at_stops(series)?)));
     let rms_m = 1e-3 * root_mean_square(&units(images));
     reasons.add_error((urdf, rms_m), expected, args.nominal.is_some(), limits);
-    if let Some(stated) = stated.as_ref().filter(|s| s.was_fitted_to(files)) {
+    if let Some(stated) = stated.as_ref().filter(|s| s.was_fitted_to(files, series)) {
         reasons.add_own(urdf, stated);
     }
     let side = Side { robot, urdf, solution: None };

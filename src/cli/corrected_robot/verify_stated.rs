@@ -12,9 +12,9 @@ use crate::assess::{
 use crate::cli::results::show::read_solution;
 use crate::model::robot::{Posture, Robot};
 use crate::output::ALONE;
-use crate::output::restore::{FoundModel, exported_model};
+use crate::output::restore::{FoundModel, exported_model, measured_series};
 use crate::output::solution_json::{self, SolutionRecord};
-use crate::problem::MeasuredSeries;
+use crate::problem::{Exposures, MeasuredSeries};
 use crate::series::{InputFile, SpatialFiles};
 
 /// The solution from which a description came, with as much of its model as is judged.
@@ -137,15 +137,22 @@ impl Stated {
         (found.rms_m > 0.0 && found.most_m.is_finite()).then_some(found)
     }
 
-    /// Whether one of these files of measurements is an input of the solution.
-    pub fn was_fitted_to(&self, files: &[InputFile]) -> bool {
-        files.iter().filter(|file| is_measurement(&file.path)).any(|file| is_input(&self.record, file))
+    /// Whether one of these files of measurements is an input of the solution, or one of these series shows an exposure of it: files of other
+    /// formats have other bytes.
+    pub fn was_fitted_to(&self, files: &[InputFile], series: &[MeasuredSeries]) -> bool {
+        let is_file = files.iter().filter(|file| is_measurement(&file.path)).any(|file| is_input(&self.record, file));
+        is_file || measured_series(&self.record).is_ok_and(|own| has_exposure_of(&own, series))
     }
 
     /// The solution.
     pub fn record(&self) -> &SolutionRecord {
         &self.record
     }
+}
+
+fn has_exposure_of(fitted: &[MeasuredSeries], series: &[MeasuredSeries]) -> bool {
+    let known = Exposures::of(fitted.iter().flat_map(|s| &s.stops));
+    series.iter().flat_map(|s| &s.stops).any(|stop| known.shows(stop))
 }
 
 /// Whether files of measurements are inputs of a solution, one of each folder; `None` where those of some folders are and those of others not.

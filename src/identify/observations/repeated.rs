@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
 use crate::error::{Code, Error, Notice, Result};
-use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop, SeenBody, Shared};
+use crate::problem::{Exposures, ImageRejection, MeasuredSeries, MeasuredStop, SeenBody, Shared};
 use crate::series::{InputFile, Plate, Series};
 
 /// Whose pictures a series has.
@@ -26,13 +26,13 @@ struct Before {
 
 /// What a series repeats of those before it.
 struct Repeated {
-    /// By its stop: the stop that shows the same, and whether that is by the picture.
+    /// By its stop: the stop that shows the same, and whether both have a picture.
     images: BTreeMap<usize, (Place, bool)>,
     /// By its index among the bodies.
     bodies: BTreeMap<usize, Place>,
 }
 
-/// Leaves out images whose picture is that of an image of a series before, taken of the same plate with the same readings, and what trackers and
+/// Leaves out images whose picture is that of an image of a series before, taken of the same plate with the same readings, in whatever format, and what trackers and
 /// contacts measured in a series before with the same readings. `views` are the series as their files say, in the order of `all`; `images` are the
 /// hashes of their images. Images without a picture are compared later, with those of their own series.
 ///
@@ -97,14 +97,17 @@ impl Repeated {
     fn of(own: &MeasuredSeries, index: usize, before: &[MeasuredSeries], shown: &[Shown]) -> Self {
         let measured = Before::of(own, before);
         let picture = |series: usize, row: usize| shown.get(series).and_then(|s| *s.pictures.get(row)?);
-        let is_picture = |row, of: Place| picture(index, row).is_some() && picture(index, row) == picture(of.0, of.1);
         let image = |(row, stop): (usize, &MeasuredStop)| {
             let repeats = |of: &Place| {
-                let is_picture = is_picture(row, *of);
+                let pictures = picture(index, row).zip(picture(of.0, of.1));
+                let original = &before[of.0].stops[of.1];
                 // Of one picture a second pass may have found more of the plate in one series than in the other.
-                let is_of_one_plate = is_picture && shown[index].plate == shown[of.0].plate;
-                let is_same = is_of_one_plate || before[of.0].stops[of.1].observations == stop.observations;
-                is_same.then_some((*of, is_picture))
+                let is_of_one_plate =
+                    pictures.is_some_and(|(own, other)| own == other) && shown[index].plate == shown[of.0].plate;
+                // In another format its bytes are others.
+                let is_one_exposure = || pictures.is_some() && Exposures::of([original]).shows(stop);
+                let is_same = is_of_one_plate || original.observations == stop.observations || is_one_exposure();
+                is_same.then_some((*of, pictures.is_some()))
             };
             Some((row, measured.stops.get(&key(stop))?.iter().find_map(repeats)?))
         };
@@ -138,7 +141,7 @@ impl Repeated {
 
     /// Takes out of the series what it repeats. What is left was seen by the same instrument, of the same body.
     fn leave_out(&self, own: &mut MeasuredSeries, before: &[MeasuredSeries]) -> Option<Notice> {
-        for (row, (of, _)) in self.images.iter().filter(|(_, (_, is_picture))| *is_picture) {
+        for (row, (of, _)) in self.images.iter().filter(|(_, (_, has_pictures))| *has_pictures) {
             let stop = &mut own.stops[*row];
             if stop.left_out.is_none() {
                 let of = format!("{}/{}", before[of.0].name, before[of.0].stops[of.1].image);
