@@ -260,6 +260,7 @@ codes! {
         TargetsLeft "targets_left" "targets stay as they are; their reasons are counted",
         TargetsMissing "targets_missing" "no target is found in the programs",
         ProgramWritten "program_written" "targets of a program were changed; the record has the hash of its bytes",
+        ProgramCopied "program_copied" "no target of a program was changed; the record has the hash of its bytes",
         CorrectedAlready "corrected_already" "a program is what an earlier correction wrote, or was made of it",
         ModelsEqual "models_equal" "both descriptions are of the same robot: nothing is corrected",
         ModelsExchanged "models_exchanged" "the nominal description is the corrected one, and the other the nominal one",

@@ -167,7 +167,7 @@ fn touches_that_tell_nothing_are_refused_by_their_reason() {
 
 fn robotcal(args: &[&str], out: &Path) -> Run {
     let output = Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).arg("--out").arg(out).output().unwrap();
-    Run { output, out: out.to_path_buf() }
+    Run { output, out: out.to_path_buf(), programs: Vec::new() }
 }
 
 struct Files {

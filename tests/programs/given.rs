@@ -14,7 +14,7 @@ fn compensate(cell: &Cell, file: &Path, nominal: &Path, urdf: &Path, flags: &[&s
     let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
     command.arg("compensate").arg(file).arg("--out").arg(&out).arg("--nominal").arg(nominal).arg("--urdf").arg(urdf);
     command.args(["--frames", "nominal", "--base", "base_link", "--tip", "tool0"]);
-    Run { output: command.args(flags).output().unwrap(), out }
+    Run { output: command.args(flags).output().unwrap(), out, programs: Vec::new() }
 }
 
 fn weight(run: &Run, code: Code) -> Option<String> {
@@ -80,7 +80,7 @@ fn a_program_that_is_corrected_already_is_not_corrected_twice() {
         command.arg("compensate").arg(&corrected).arg("--out").arg(&out).arg("--nominal").arg(&cell.nominal_urdf);
         command.arg("--urdf").arg(&cell.real_urdf).arg("--compensation").arg(&cell.compensation);
         command.args(["--frames", "nominal", "--base", "base_link", "--tip", "tool0", "--unordered"]);
-        Run { output: command.args(flags).output().unwrap(), out: out.clone() }
+        Run { output: command.args(flags).output().unwrap(), out: out.clone(), programs: Vec::new() }
     };
     let twice = again(&[]).expect(1);
     assert_eq!(weight(&twice, Code::CorrectedAlready).as_deref(), Some("gate"), "{}", twice.said());
@@ -90,6 +90,94 @@ fn a_program_that_is_corrected_already_is_not_corrected_twice() {
     std::fs::write(&corrected, format!("{text}; by hand\n")).unwrap();
     let by_hand = again(&[]).expect(0);
     assert_eq!(weight(&by_hand, Code::CorrectedAlready).as_deref(), Some("note"), "{}", by_hand.said());
+}
+
+/// A program of one target.
+fn one_target(cell: &mut Cell) -> String {
+    let q = cell.readings();
+    let axes = q.iter().enumerate().map(|(k, v)| format!("A{} {:.4}", k + 1, v.to_degrees())).collect::<Vec<_>>();
+    format!("DEF a()\nPTP {{{}}}\nEND\n", axes.join(","))
+}
+
+#[test]
+fn programs_that_are_corrected_one_after_the_other_into_one_folder_are_all_on_record() {
+    let mut cell = Cell::kuka(126);
+    let files = ["a.src", "b.src", "c.src"].map(|name| {
+        let text = one_target(&mut cell);
+        cell.write(name, text.as_bytes())
+    });
+    for file in files.iter().chain(&files[..1]) {
+        cell.compensate(&[file], &["--unordered"]).expect(0);
+    }
+    let out = cell.folder.path().join("out");
+    let rows = || {
+        let table = std::fs::read_to_string(out.join("corrections.csv")).unwrap();
+        let mut reader = csv::Reader::from_reader(table.as_bytes());
+        let name = |row: csv::StringRecord| Path::new(&row[0]).file_name().unwrap().to_str().unwrap().to_owned();
+        let mut names: Vec<String> = reader.records().map(|row| name(row.unwrap())).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(rows(), ["a.src", "b.src", "c.src"]);
+    let twice = |name: &str| {
+        let run = compensate_into(&cell, &[&out.join(name)], &cell.folder.path().join("twice"));
+        (run.output.status.code(), weight(&run, Code::CorrectedAlready))
+    };
+    for name in ["a.src", "b.src", "c.src"] {
+        assert_eq!(twice(name), (Some(1), Some("gate".to_owned())), "{name}");
+    }
+    // What is no longer there is on no record.
+    std::fs::remove_file(out.join("b.src")).unwrap();
+    cell.compensate(&[&files[2]], &["--unordered"]).expect(0);
+    assert_eq!(rows(), ["a.src", "c.src"]);
+}
+
+fn compensate_into(cell: &Cell, files: &[&Path], out: &Path) -> Run {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
+    command.arg("compensate").args(files).arg("--out").arg(out).arg("--nominal").arg(&cell.nominal_urdf);
+    command.arg("--urdf").arg(&cell.real_urdf).arg("--compensation").arg(&cell.compensation);
+    command.args(["--frames", "nominal", "--base", "base_link", "--tip", "tool0", "--unordered"]);
+    Run { output: command.output().unwrap(), out: out.to_path_buf(), programs: Vec::new() }
+}
+
+#[test]
+fn programs_and_records_of_the_user_are_not_replaced() {
+    let mut cell = Cell::kuka(127);
+    let [text, other] = [0, 1].map(|_| one_target(&mut cell));
+    let without = "DEFDAT a\n;comment\nENDDAT\n";
+    let folder = cell.folder.path().to_path_buf();
+    for place in ["p1", "p2", "own"] {
+        std::fs::create_dir(folder.join(place)).unwrap();
+    }
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    let [src, dat] = ["p1/a.src", "p1/a.dat"].map(|name| folder.join(name));
+    write("p1/a.src", &text);
+    write("p1/a.dat", without);
+    write("p2/a.src", &other);
+    let refused = |files: &[&Path], out: &str, kept: &str| {
+        let before = std::fs::read(folder.join(out).join(kept)).unwrap();
+        let run = compensate_into(&cell, files, &folder.join(out)).expect(2);
+        assert!(run.said().starts_with("error[output_exists]: "), "{}", run.said());
+        assert!(std::fs::read(folder.join(out).join(kept)).unwrap() == before);
+    };
+    for (name, text) in [("a.src", "DEF a()\n; mine\nEND\n"), ("findings.json", "{}\n"), ("corrections.csv", "a,b\n")] {
+        write(&format!("own/{name}"), text);
+        refused(&[&src], "own", name);
+        std::fs::remove_file(folder.join("own").join(name)).unwrap();
+    }
+    let good = || compensate_into(&cell, &[&src, &dat], &folder.join("out")).expect(0);
+    good();
+    good();
+    // The program is taught anew; the other file of it is a copy.
+    write("p1/a.src", &other);
+    write("p1/a.dat", &without.replace("comment", "another"));
+    good();
+    // Of another cell.
+    refused(&[&folder.join("p2/a.src")], "out", "a.src");
+    // Touched up by hand.
+    let corrected = std::fs::read_to_string(folder.join("out/a.src")).unwrap();
+    write("out/a.src", &format!("{corrected}; by hand\n"));
+    refused(&[&src, &dat], "out", "a.src");
 }
 
 /// Columns of external axes beside poses; an empty cell, or one that says it is not used, leaves the axis where it is.

@@ -616,7 +616,7 @@ fn the_controller_may_compute_in_a_frame_that_is_fixed_beside_the_arm() {
             "--tip",
             "tool0",
         ]);
-        crate::programs_support::Run { output: command.output().unwrap(), out }
+        crate::programs_support::Run { output: command.output().unwrap(), out, programs: Vec::new() }
     };
     let run = call("base").expect(0);
     assert!(findings(&run).contains_key("nominal_is_controllers"));
@@ -657,7 +657,7 @@ fn what_base_and_tool_leave_is_stated_by_the_covariance_of_the_solution() {
         command.arg("compensate").arg(&file).arg("--out").arg(&out).arg("--nominal").arg(&cell.nominal_urdf);
         command.arg("--urdf").arg(urdf).arg("--compensation").arg(report.join("compensation.toml"));
         command.args(["--joint-unit", "rad", "--unordered", "--base", "base_link", "--tip", "tool0"]).args(more);
-        crate::programs_support::Run { output: command.output().unwrap(), out }
+        crate::programs_support::Run { output: command.output().unwrap(), out, programs: Vec::new() }
     };
     let run = call(&report.join("kuka_kr6_r900.calibrated.urdf"), &[]);
     let (_, told) = &findings(&run)["expected_error"];

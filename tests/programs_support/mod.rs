@@ -134,7 +134,7 @@ impl Cell {
         command.arg("--compensation").arg(&self.compensation);
         command.args(["--frames", "nominal", "--base", &self.nominal.chain.base, "--tip", &self.nominal.chain.tip]);
         let output = command.args(flags).output().unwrap();
-        Run { output, out }
+        Run { output, out, programs: files.iter().map(|file| (*file).clone()).collect() }
     }
 }
 
@@ -142,6 +142,8 @@ impl Cell {
 pub struct Run {
     pub output: Output,
     pub out: PathBuf,
+    /// Of which `told` tells; of all in the folder where none is named.
+    pub programs: Vec<PathBuf>,
 }
 
 impl Run {
@@ -179,7 +181,11 @@ impl Run {
         let headers = reader.headers().unwrap().clone();
         let cell =
             |row: &csv::StringRecord, name: &str| row[headers.iter().position(|h| h == name).unwrap()].to_owned();
-        let rows: Vec<csv::StringRecord> = reader.records().map(|r| r.unwrap()).collect();
+        let is_own = |row: &csv::StringRecord| {
+            let name = |path: &Path| path.file_name().map(|name| name.to_owned());
+            self.programs.is_empty() || self.programs.iter().any(|p| name(p) == name(Path::new(&row[0])))
+        };
+        let rows: Vec<csv::StringRecord> = reader.records().map(|r| r.unwrap()).filter(is_own).collect();
         let left = |row: &&csv::StringRecord| !cell(row, "reason").is_empty();
         let of =
             |row: &csv::StringRecord| (cell(row, "line").parse().unwrap(), cell(row, "target"), cell(row, "reason"));

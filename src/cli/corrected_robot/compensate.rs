@@ -19,7 +19,7 @@ use crate::geom::Pose;
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
 use crate::output::corrections::{self, FileFinding, Meant, TABLE};
-use crate::output::written_programs::WrittenProgram;
+use crate::output::written_programs::{OfOthers, WrittenProgram, require_same_source, seen_from};
 use crate::output::{ResultFolder, compensated};
 use crate::programs::compensate::Compensated;
 use crate::programs::{
@@ -267,7 +267,7 @@ fn poses_have_model(args: &CompensateArgs, program: &Program) -> Result<()> {
     Err(Error::new(Code::ProgramModelMissing, place, what, "give that model with --nominal"))
 }
 
-/// Writes the programs, the table and the findings; says how many files these are.
+/// Writes the programs, the table and the findings, with what they say of programs that other runs wrote there; says how many files these are.
 fn write(
     args: &CompensateArgs,
     place: &ResultFolder,
@@ -281,10 +281,15 @@ fn write(
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         written.push((name, bytes));
     }
-    let is_changed = |(file, new): &(&TextFile, &(String, &[u8]))| file.bytes != new.1;
-    let changed = program.files.iter().zip(&written).filter(is_changed);
-    let records: Vec<_> = changed.map(|(_, (name, bytes))| WrittenProgram::new(name, bytes)).collect();
+    let names: Vec<&str> = written.iter().map(|(name, _)| name.as_str()).collect();
+    let OfOthers { programs: mut records, corrections } = OfOthers::read(place.path(), &names, report);
+    for ((path, file), (name, bytes)) in args.programs.iter().zip(&program.files).zip(&written) {
+        let made_of = seen_from(place.path(), path);
+        require_same_source(place.path(), name, &made_of)?;
+        records.push(WrittenProgram::new((name, bytes), &file.bytes, made_of));
+    }
     let said = corrections::findings_json(findings, &records)?;
+    let report = format!("{report}{corrections}");
     written.push((corrections::TABLE.to_owned(), report.as_bytes()));
     written.push((corrections::FINDINGS.to_owned(), said.as_bytes()));
     place.write_beside(&written, &args.programs)?;
