@@ -119,7 +119,9 @@ impl Command {
 
 /// What `show`, `show --all` and `show --parameters` print of a solution.
 pub fn summary_of(record: &crate::output::solution_json::SolutionRecord) -> String {
-    summary::text(record, std::path::Path::new("")) + &long_table::text(record) + &long_table::parameters(record)
+    summary::text(record, std::path::Path::new(""), std::path::Path::new(crate::output::REPORT))
+        + &long_table::text(record)
+        + &long_table::parameters(record)
 }
 
 /// Runs the program with the arguments of the process.

@@ -236,27 +236,30 @@ fn the_series_that_a_model_was_fitted_to_proves_nothing() {
 fn pictures_in_another_format_are_no_second_measurement() {
     let nominal = kr6_urdf();
     let folder = tempfile::tempdir().unwrap();
-    let [png, bmp, part] = ["png", "bmp", "part"].map(|name| folder.path().join(name));
+    let [png, bmp, first, last] = ["png", "bmp", "first", "last"].map(|name| folder.path().join(name));
     let [urdf, of] = [&nominal, &png].map(|p| p.to_str().unwrap());
     let simulated = ["simulate", "--urdf", urdf, "--out", of, "--images", "24", "--errors", "rigid"];
     assert!(robotcal(&simulated).status.success());
-    let encoded = |into: &Path, count: usize| {
+    let encoded = |into: &Path, stops: std::ops::Range<usize>, format: &str| {
         std::fs::create_dir_all(into.join("images")).unwrap();
         for name in ["series.toml", "plate.toml", "plate.csv"] {
             std::fs::copy(png.join(name), into.join(name)).unwrap();
         }
         let joints = std::fs::read_to_string(png.join("joints.csv")).unwrap();
-        let rows: Vec<&str> = joints.lines().take(count + 1).collect();
-        std::fs::write(into.join("joints.csv"), (rows.join("\n") + "\n").replace(".png", ".bmp")).unwrap();
-        for row in &rows[1..] {
+        let (head, rows) = joints.split_once('\n').unwrap();
+        let rows: Vec<&str> = rows.lines().skip(stops.start).take(stops.len()).collect();
+        std::fs::write(into.join("joints.csv"), format!("{head}\n{}\n", rows.join("\n")).replace(".png", format))
+            .unwrap();
+        for row in &rows {
             let name = row.split(',').next().unwrap();
             let picture = image::open(png.join("images").join(name)).unwrap();
-            picture.save(into.join("images").join(name.replace(".png", ".bmp"))).unwrap();
+            picture.save(into.join("images").join(name.replace(".png", format))).unwrap();
         }
     };
-    encoded(&bmp, 24);
-    encoded(&part, 8);
-    let [of_bmp, of_part] = [&bmp, &part].map(|p| p.to_str().unwrap());
+    encoded(&bmp, 0..24, ".bmp");
+    encoded(&first, 0..16, ".png");
+    encoded(&last, 8..24, ".bmp");
+    let [of_bmp, of_first, of_last] = [&bmp, &first, &last].map(|p| p.to_str().unwrap());
     let identify = |series: &[&str], out: &str| {
         let into = folder.path().join(out);
         let flags = ["identify", "--urdf", urdf, "--robot-model", "rigid", "--out", into.to_str().unwrap(), "--series"];
@@ -266,8 +269,8 @@ fn pictures_in_another_format_are_no_second_measurement() {
     let said = String::from_utf8_lossy(&twice.stderr).into_owned();
     assert_eq!(twice.status.code(), Some(2), "{said}");
     assert!(said.contains(&format!("error[{}]", Code::SeriesRepeated.name())), "{said}");
-    // A part of them is left out, and the result is that of the whole.
-    let (_, both) = identify(&[of, of_part], "both");
+    // What both have counts once.
+    let (_, both) = identify(&[of_first, of_last], "both");
     let solution: serde_json::Value =
         serde_json::from_slice(&std::fs::read(both.join("solution.json")).unwrap()).unwrap();
     assert_eq!([&solution["statistics"]["images"], &solution["statistics"]["images_used"]], [32, 24]);

@@ -453,16 +453,80 @@ fn a_folder_made_for_nothing_goes_again() {
 fn files_among_others_come_together() {
     let root = tempfile::tempdir().unwrap();
     let out = root.path().join("reports");
-    let files = |content: &'static str| ["a.md", "b.html"].map(|n| (n.to_owned(), content.as_bytes()));
-    write_beside(&out, &files("old"), &[]).unwrap();
+    let table = |content: &str| format!("j1,x_m,y_m,z_m,qx,qy,qz,qw,sigma_mm,sigma_mrad,outside\n{content}\n");
+    let [old, new] = ["old", "new"].map(table);
+    fn files(content: &str) -> [(String, &[u8]); 2] {
+        ["a.csv", "b.csv"].map(|n| (n.to_owned(), content.as_bytes()))
+    }
+    write_beside(&out, &files(&old), &[]).unwrap();
     fs::write(out.join("mine.md"), "mine").unwrap();
     // The second cannot be a file: neither of them is changed.
-    let error = write_beside(&out, &[("a.md".into(), &b"new"[..]), ("x".repeat(300), &b"new"[..])], &[]).unwrap_err();
+    let error = write_beside(&out, &[("a.csv".into(), &b"new"[..]), ("x".repeat(300), &b"new"[..])], &[]).unwrap_err();
     assert_eq!(error.exit_code(), 2);
-    assert_eq!(fs::read(out.join("a.md")).unwrap(), b"old");
-    write_beside(&out, &files("new"), &[]).unwrap();
-    let expected = [("a.md", "new"), ("b.html", "new"), ("mine.md", "mine")];
+    assert_eq!(fs::read_to_string(out.join("a.csv")).unwrap(), old);
+    write_beside(&out, &files(&new), &[]).unwrap();
+    // One of them is the user's: neither is changed.
+    fs::write(out.join("b.csv"), "x,y\n1,2\n").unwrap();
+    assert_eq!(write_beside(&out, &files(&old), &[]).unwrap_err().code, Code::OutputExists);
+    let expected = [("a.csv", new.as_str()), ("b.csv", "x,y\n1,2\n"), ("mine.md", "mine")];
     assert_eq!(all_below(&out), expected.map(|(n, c)| (n.to_owned(), c.into())).into());
+}
+
+/// An earlier result of the command is replaced, whatever is not of the program stays.
+#[test]
+fn files_of_the_user_are_not_replaced() {
+    let root = tempfile::tempdir().unwrap();
+    let solution = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/kr6_small/solution.json").display().to_string();
+    let joints = "joint_a1,joint_a2,joint_a3,joint_a4,joint_a5,joint_a6\n10,-80,90,20,40,10\n";
+    fs::write(root.path().join("at_joints.csv"), joints).unwrap();
+    let at = ["show", &solution, "--at", "at_joints.csv", "--at-unit", "deg", "--out", "at"];
+    for (args, made) in [
+        (&["show", &solution, "--report", "own/r.html"][..], "own/r.html"),
+        (&["show", &solution, "--figures", "figures"], "figures"),
+        (&at, "at/at.csv"),
+        (&["frames", "--from", &solution, "--plate", "--out", "frames"], "frames/frames.json"),
+        (&["frames", "--from", &solution, "--plate", "--out", "frames"], "frames/robotcal_frames.src"),
+    ] {
+        for _ in 0..2 {
+            let (code, said) = robotcal(root.path(), args);
+            assert_ne!(code, Some(2), "{args:?}: {said}");
+        }
+        let mut made = root.path().join(made);
+        if made.is_dir() {
+            let first = fs::read_dir(&made).unwrap().next().unwrap().unwrap();
+            made = first.path();
+        }
+        let written = fs::read(&made).unwrap();
+        let users = [b"of the user, by hand\n", &written[written.len() / 2..]].concat();
+        fs::write(&made, &users).unwrap();
+        let (code, said) = robotcal(root.path(), args);
+        assert_eq!(code, Some(2), "{args:?}: {said}");
+        assert!(said.starts_with("error[output_exists]: "), "{args:?}: {said}");
+        assert!(fs::read(&made).unwrap() == users, "{args:?}");
+        fs::write(&made, &written).unwrap();
+        assert_ne!(robotcal(root.path(), args).0, Some(2), "{args:?}");
+    }
+    // Known before the work.
+    fs::write(root.path().join("monte-carlo.md"), "# Monte Carlo, by hand\n").unwrap();
+    let urdf = kr6_urdf().display().to_string();
+    let (code, said) = robotcal(root.path(), &["compare", "--monte-carlo", "--urdf", &urdf, "--out", "."]);
+    assert!(code == Some(2) && said.starts_with("error[output_exists]: "), "{said}");
+    // Joints of a series are no report.
+    let readings = root.path().join("at_joints.csv");
+    let (code, said) = robotcal(root.path(), &["show", &solution, "--report", "at_joints.csv"]);
+    assert!(code == Some(2) && said.starts_with("error[output_exists]: "), "{said}");
+    assert_eq!(fs::read_to_string(readings).unwrap(), joints);
+}
+
+#[test]
+fn a_report_that_is_written_again_is_named() {
+    let root = tempfile::tempdir().unwrap();
+    let solution = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/kr6_small/solution.json");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
+    let shown = command.arg("show").arg(solution).args(["--report", "mine.html"]).current_dir(root.path()).output();
+    let said = String::from_utf8(shown.unwrap().stdout).unwrap();
+    let named = said.lines().find_map(|line| line.strip_prefix("report")).unwrap().trim_start();
+    assert!(named.starts_with("mine.html"), "{said}");
 }
 
 #[test]

@@ -263,6 +263,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("output/solution/check.rs POSE_COVARIANCE", "size of a matrix"),
     ("output/solution/check.rs ROUNDING", "rounding of a file"),
     ("output/solution/solution_json.rs FORMAT", "number of a format"),
+    ("output/write/own.rs HEAD", "how much of a file is looked at"),
     ("output/robot/ur_frames.rs NEAR_M", "which frames of ur_description are meant"),
     ("output/robot/ur_frames.rs PARALLEL", "rounding of directions"),
     ("output/robot/ur_frames.rs TURNED_RAD", "which frames of ur_description are meant"),

@@ -80,7 +80,7 @@ pub(super) fn run(args: &StudyArgs, out: &Path, overlay: bool) -> Result<Verdict
     if args.views == 0 {
         return Err(Error::new(Code::OptionRange, "--views", "0 views show nothing", "give 1 or more"));
     }
-    let place = ResultFolder::among(out)?;
+    let place = ResultFolder::among(out)?.for_files(&[REPORT])?;
     let mut sections = Vec::new();
     let mut pictures = Vec::new();
     for part in Part::value_variants().iter().filter(|part| args.part.is_empty() || args.part.contains(part)) {

@@ -56,10 +56,15 @@ pub struct CompareArgs {
     recording: RecordingArgs,
 }
 
+/// Files of the reports.
+const COMPARISON: &str = "comparison.md";
+const STUDY: [&str; 2] = ["two-stage-vs-joint.md", "two-stage-vs-joint.html"];
+const MONTE_CARLO: &str = "monte-carlo.md";
+
 impl CompareArgs {
     /// The folder for reports, tried before the work.
-    fn place(&self) -> Result<ResultFolder> {
-        ResultFolder::among(self.out.as_deref().unwrap_or(Path::new("reports")))
+    fn place(&self, files: &[&str]) -> Result<ResultFolder> {
+        ResultFolder::among(self.out.as_deref().unwrap_or(Path::new("reports")))?.for_files(files)
     }
 }
 
@@ -72,7 +77,7 @@ pub fn run(args: &CompareArgs) -> Result<Verdict> {
 }
 
 fn series(args: &CompareArgs) -> Result<Verdict> {
-    let place = args.out.as_deref().map(ResultFolder::among).transpose()?;
+    let place = args.out.is_some().then(|| args.place(&[COMPARISON])).transpose()?;
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
     let inputs = Inputs::read(&args.urdf, &args.series, ends)?.with_recordings(&args.recording.options(&[])?)?;
     let truth = truth_of(&inputs.series)?;
@@ -90,7 +95,7 @@ fn series(args: &CompareArgs) -> Result<Verdict> {
     if let Some(place) = place {
         let command = command_of_report();
         let report = format!("# Two-step calibration against the joint fit, on a series\n\n    {command}\n\n{text}");
-        write(&place, [("comparison.md", report)])?;
+        write(&place, [(COMPARISON, report)])?;
     }
     Ok(Verdict::Good)
 }
@@ -103,7 +108,7 @@ fn truth_of(all: &[Series]) -> Result<Option<Truth>> {
 }
 
 fn study(args: &CompareArgs) -> Result<Verdict> {
-    let place = args.place()?;
+    let place = args.place(&STUDY)?;
     let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     if args.seeds < 2 {
         return Err(Error::new(
@@ -122,10 +127,7 @@ fn study(args: &CompareArgs) -> Result<Verdict> {
     bar.finish_and_clear();
     let command = command_of_report();
     study_verdict(&study).iter().for_each(|line| say_line!("{line}"));
-    let files = [
-        ("two-stage-vs-joint.md", study_markdown(&study, &command)),
-        ("two-stage-vs-joint.html", study_html(&study, &command)),
-    ];
+    let files = [(STUDY[0], study_markdown(&study, &command)), (STUDY[1], study_html(&study, &command))];
     write(&place, files)?;
     Ok(Verdict::Good)
 }
@@ -135,7 +137,7 @@ const MONTE_CARLO_NOISE: [f64; 5] = [0.0, 2.5e-6, 5e-6, 2e-5, 1e-4];
 const MONTE_CARLO_IMAGES: usize = 40;
 
 fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
-    let place = args.place()?;
+    let place = args.place(&[MONTE_CARLO])?;
     let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     let request = MonteCarloRequest {
         chain,
@@ -151,7 +153,7 @@ fn monte_carlo(args: &CompareArgs) -> Result<Verdict> {
     bar.finish_and_clear();
     let text = monte_carlo_markdown(&cells, &command_of_report());
     say!("{text}");
-    write(&place, [("monte-carlo.md", text)])?;
+    write(&place, [(MONTE_CARLO, text)])?;
     Ok(Verdict::Good)
 }
 

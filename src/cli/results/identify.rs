@@ -17,7 +17,7 @@ use crate::cli::terminal::{progress, stages};
 use crate::error::{Code, Error, Notice, Result};
 use crate::identify::{Estimator, Options, dry_run};
 use crate::output::solution_json::{FILE_NAME, TIMINGS};
-use crate::output::{Offsets, Poses, ResultFolder, folder_name, restore};
+use crate::output::{Offsets, Poses, REPORT, ResultFolder, folder_name, restore};
 
 /// Flags of `identify`.
 #[derive(Debug, Args)]
@@ -182,7 +182,7 @@ fn write(
     match (args.json, stages::are_told()) {
         (true, _) => say!("{}", String::from_utf8_lossy(&bytes)),
         (_, true) => say!("{}", long_table::text(&record)),
-        _ => say!("{}", summary::text(&record, &folder)),
+        _ => say!("{}", summary::text(&record, &folder, &folder.join(REPORT))),
     }
     if let Some(at) = at {
         say!("{}", at.run(&record, &folder)?);

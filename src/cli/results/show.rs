@@ -14,7 +14,7 @@ use crate::files::{self, FileKind};
 use crate::output::difference::{Difference, compare_solutions};
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::output::verdict;
-use crate::output::{Thumbnails, figure_files, recover, report_html, write_beside};
+use crate::output::{REPORT, Thumbnails, figure_files, recover, report_html, write_beside};
 use crate::urdf::JointKind;
 
 /// Flags of `show`.
@@ -88,7 +88,7 @@ pub fn run(args: &ShowArgs) -> Result<Verdict> {
     let folder = if given.is_dir() { given } else { given.parent().unwrap_or(Path::new("")) };
     match args.all || stages::are_told() {
         true => say!("{}", long_table::text(&first)),
-        false => say!("{}", summary::text(&first, folder)),
+        false => say!("{}", summary::text(&first, folder, args.report.as_deref().unwrap_or(&folder.join(REPORT)))),
     }
     if args.parameters {
         say!("{}", long_table::parameters(&first));

@@ -21,8 +21,8 @@ const MOST_LINES: usize = 12;
 /// Most lines of why the result asks for a look.
 const MOST_DOUBTS: usize = 4;
 
-/// The answer; `folder` is that of the result.
-pub fn text(record: &SolutionRecord, folder: &Path) -> String {
+/// The answer; `folder` is that of the result, and `report` the file of its report.
+pub fn text(record: &SolutionRecord, folder: &Path, report: &Path) -> String {
     let verdict = Verdict::of(record);
     let failed = verdict.trust == Trust::Failed;
     let mut figures = if failed { flange_in_brief(record) } else { flange(record) };
@@ -37,7 +37,7 @@ pub fn text(record: &SolutionRecord, folder: &Path) -> String {
     let reasons = reasons(&verdict, free.saturating_sub(next.len()));
     let mut lines = vec![headline(&verdict)];
     [reasons, figures, next].into_iter().for_each(|more| lines.extend(more));
-    lines.push(results(record, folder));
+    lines.push(results(record, report));
     if lines.len() < MOST_LINES {
         let file = folder.join(crate::output::solution_json::FILE_NAME);
         lines.push(indented("more", &format!("robotcal show --all {}", word(file.display()))));
@@ -227,8 +227,8 @@ fn advice(r: &SolutionRecord, a: &Advice) -> String {
 }
 
 /// Where all of it stands.
-fn results(r: &SolutionRecord, folder: &Path) -> String {
-    let report = indented("report", &folder.join(crate::output::REPORT).display().to_string());
+fn results(r: &SolutionRecord, report: &Path) -> String {
+    let report = indented("report", &report.display().to_string());
     let urdf = [ALONE, CALIBRATED].into_iter().find_map(|end| Some((r.file_ending_with(end)?, end)));
     let names = urdf.into_iter().flat_map(|(name, end)| [format!("; robot: {name}"), format!("; robot: *{end}")]);
     let beside = names.map(|name| format!("{report}{name}")).find(|line| line.len() <= WIDTH);

@@ -286,9 +286,11 @@ fn settle_place(args: &PlanArgs, request: &mut PlanRequest) -> Result<Vec<String
 
 /// Images planned and drawn in a study.
 const STUDIED: [usize; 2] = [30, 60];
+/// File of their report.
+const STUDY: &str = "study.md";
 
 fn study(args: &PlanArgs, seeds: u64) -> Result<Verdict> {
-    let place = ResultFolder::among(&args.out)?;
+    let place = ResultFolder::among(&args.out)?.for_files(&[STUDY])?;
     let chain = read_chain(args.urdf(), args.base.as_deref(), args.tip.as_deref())?;
     let robot = chain.robot.clone();
     let [planned, random] = STUDIED;
@@ -304,7 +306,7 @@ fn study(args: &PlanArgs, seeds: u64) -> Result<Verdict> {
     };
     let study = plan_study(&request, |seed| tracing::info!("world {seed} done"))?;
     let text = crate::study::study_table(&robot, &request, &study);
-    place.write_beside(&[("study.md".to_owned(), text.as_bytes())], &[args.urdf().to_path_buf()])?;
+    place.write_beside(&[(STUDY.to_owned(), text.as_bytes())], &[args.urdf().to_path_buf()])?;
     say!("{text}");
     Ok(Verdict::Good)
 }

@@ -7,6 +7,7 @@
 mod held;
 mod journal;
 mod new_result;
+mod own;
 mod place;
 mod staging;
 mod strays;
@@ -33,10 +34,11 @@ pub fn write_all(dir: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
     ResultFolder::claim(dir, record.unwrap_or(tree::RECORDS[0]))?.write_all(files)
 }
 
-/// Writes files into a folder among whatever is there, all of them or none; none of them may be one of `inputs`.
+/// Writes files into a folder among whatever is there, all of them or none; none of them may be one of `inputs`, or take the place of a file that is
+/// not this program's own as it wrote it.
 ///
 /// # Errors
-/// A file that is one of the inputs; anything that cannot be written or renamed.
+/// A file that is one of the inputs, or is there and somebody else's; anything that cannot be written or renamed.
 pub fn write_beside(dir: &Path, files: &[(String, &[u8])], inputs: &[PathBuf]) -> Result<()> {
     ResultFolder::among(dir)?.write_beside(files, inputs)
 }

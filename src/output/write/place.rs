@@ -8,7 +8,7 @@ use super::held::{Held, Taken};
 use super::staging::Staging;
 use super::strays::{bring_back, part_name, sweep_beside};
 use super::tree::write_synced;
-use super::{journal, tree};
+use super::{journal, own, tree};
 use crate::error::{Code, Error, Result};
 
 /// What to do where work would be lost.
@@ -79,6 +79,15 @@ impl ResultFolder {
         Ok(place)
     }
 
+    /// This place for files of these names, of which none is there that somebody else made.
+    ///
+    /// # Errors
+    /// Such a file.
+    pub fn for_files(self, names: &[&str]) -> Result<Self> {
+        names.iter().try_for_each(|name| self.require_replaceable(name, &[]))?;
+        Ok(self)
+    }
+
     /// The folder as it was given.
     pub fn path(&self) -> &Path {
         &self.given
@@ -146,6 +155,7 @@ impl ResultFolder {
         fs::create_dir_all(target).map_err(|e| Error::io(target, &e))?;
         for (k, (name, _)) in files.iter().enumerate() {
             self.require_its_own(name, inputs)?;
+            self.require_replaceable(name, files)?;
             if files[..k].iter().any(|(other, _)| other == name) {
                 let path = target.join(name);
                 return Err(Error::new(
@@ -183,6 +193,19 @@ impl ResultFolder {
             let remedy = "give a new folder with --out, or remove this file";
             Err(Error::new(Code::OutputExists, place.display(), "is there already, and would be another", remedy))
         })
+    }
+
+    fn require_replaceable(&self, name: &str, files: &[(String, &[u8])]) -> Result<()> {
+        let is_there = self.target.join(name).symlink_metadata().is_ok();
+        if !is_there || own::is_own(&self.target, name, files) {
+            return Ok(());
+        }
+        Err(Error::new(
+            Code::OutputExists,
+            self.given.join(name).display(),
+            "is there already, and is not what this program wrote there",
+            "name another place for the result (--out), or move this file away",
+        ))
     }
 
     fn require_its_own(&self, name: &str, inputs: &[PathBuf]) -> Result<()> {
