@@ -529,6 +529,37 @@ fn a_report_that_is_written_again_is_named() {
     assert!(named.starts_with("mine.html"), "{said}");
 }
 
+/// Nobody named the folder in which two series of one name meet.
+#[test]
+fn a_result_of_another_robot_or_series_is_not_replaced_unasked() {
+    let root = tempfile::tempdir().unwrap();
+    let ur = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf").display().to_string();
+    let kr = kr6_urdf().display().to_string();
+    let series = [(&kr, "z1/run1"), (&ur, "z2/run1"), (&kr, "z3/run1")];
+    for (urdf, folder) in series {
+        let flags = ["--observations", "--images", "24", "--errors", "rigid"];
+        let (code, said) =
+            robotcal(root.path(), &[&["simulate", "--urdf", urdf, "--out", folder], &flags[..]].concat());
+        assert_eq!(code, Some(0), "{said}");
+    }
+    let identify = |(urdf, folder): (&String, &str)| {
+        robotcal(root.path(), &["identify", "--urdf", urdf, "--series", folder, "--robot-model", "rigid"])
+    };
+    let result = || fs::read(root.path().join("reports/run1/solution.json")).unwrap();
+    let (code, said) = identify(series[0]);
+    assert_ne!(code, Some(2), "{said}");
+    let first = result();
+    for other in &series[1..] {
+        let (code, said) = identify(*other);
+        assert!(code == Some(2) && said.starts_with("error[output_exists]: "), "{said}");
+        assert!(result() == first);
+    }
+    for same in ["z1/run1", "./z1/run1"] {
+        let (code, said) = identify((&kr, same));
+        assert_ne!(code, Some(2), "{said}");
+    }
+}
+
 #[test]
 fn a_folder_that_vanishes_is_made_again() {
     let root = tempfile::tempdir().unwrap();

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use serde::Deserialize;
 
 use super::at::{AtArgs, AtTable};
 use super::show::{read_solution, read_solution_with_bytes};
@@ -18,6 +19,7 @@ use crate::error::{Code, Error, Notice, Result};
 use crate::identify::{Estimator, Options, dry_run};
 use crate::output::solution_json::{FILE_NAME, TIMINGS};
 use crate::output::{Offsets, Poses, REPORT, ResultFolder, folder_name, restore};
+use crate::series::InputFile;
 
 /// Flags of `identify`.
 #[derive(Debug, Args)]
@@ -131,7 +133,9 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
             };
             if place.is_none() && !args.dry_run {
                 let names: Vec<String> = inputs.series.iter().map(|s| s.name.clone()).collect();
-                place = Some(claim(&Path::new("reports").join(folder_name(&names)))?);
+                let folder = Path::new("reports").join(folder_name(&names));
+                place = Some(claim(&folder)?);
+                require_same_series(&folder, &inputs.chain.robot, &args.series)?;
             }
             if !args.dry_run {
                 at = args.at.table(&inputs.chain)?;
@@ -159,6 +163,30 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let calibration = Calibration::of(observed, &Options { estimator, ..options })
         .inspect_err(|_| Notice::said_once(&noticed).iter().for_each(|n| tracing::warn!("{}", n.coded())))?;
     write(args, calibration, place, at.as_ref())
+}
+
+/// Refuses to replace, in a folder that nobody named, the result of another robot or of series of the same names elsewhere.
+fn require_same_series(folder: &Path, robot: &str, series: &[PathBuf]) -> Result<()> {
+    #[derive(Deserialize)]
+    struct Earlier {
+        robot: Robot,
+        inputs: Vec<InputFile>,
+    }
+    #[derive(Deserialize)]
+    struct Robot {
+        name: String,
+    }
+    let bytes = std::fs::read(folder.join(FILE_NAME)).unwrap_or_default();
+    let Ok(earlier) = serde_json::from_slice::<Earlier>(&bytes) else { return Ok(()) };
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    let read: Vec<PathBuf> = earlier.inputs.iter().map(|file| real(&file.path)).collect();
+    let is_new = |path: &&PathBuf| !read.iter().any(|file| file.starts_with(real(path)));
+    let what = match series.iter().find(is_new) {
+        _ if earlier.robot.name != robot => format!("holds the result of another robot, {}", earlier.robot.name),
+        Some(other) => format!("holds the result of other series than {}", other.display()),
+        None => return Ok(()),
+    };
+    Err(Error::new(Code::OutputExists, folder.display(), what, "name a folder for this result with --out"))
 }
 
 fn write(
