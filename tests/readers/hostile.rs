@@ -291,7 +291,8 @@ fn large_pictures_of_a_folder_are_looked_at_one_by_one() {
         most.fetch_max(now.fetch_add(1, SeqCst) + 1, SeqCst);
         std::thread::sleep(Duration::from_millis(30));
         now.fetch_sub(1, SeqCst);
-        Err(robotcal::Error::new(robotcal::Code::FileMissing, path.display(), "is not there", "nothing"))
+        let error = robotcal::Error::new(robotcal::Code::FileMissing, path.display(), "is not there", "nothing");
+        Err::<detect::Picture, _>(error)
     };
     let threads = rayon::ThreadPoolBuilder::new().num_threads(4).build().unwrap();
     let found = threads.install(|| detect::detect_series(&images, &plate, picture, |_| ()));

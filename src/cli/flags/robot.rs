@@ -15,7 +15,9 @@ pub fn read_chain(file: &Path, base: Option<&str>, tip: Option<&str>) -> Result<
 pub fn noted_chain(description: &RobotDescription, base: Option<&str>, tip: Option<&str>) -> Result<Chain> {
     let chain = description.chain(base, tip)?;
     let tip = description.tip_notice(base, tip);
-    tip.iter().chain(&description.notices).for_each(|notice| say_line!("note      {}", notice.coded()));
+    tip.iter()
+        .chain(&Notice::said_once(&description.notices))
+        .for_each(|notice| say_line!("note      {}", notice.coded()));
     Ok(chain)
 }
 

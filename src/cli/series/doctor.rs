@@ -158,7 +158,7 @@ fn examine(series: Series, args: &DoctorArgs, options: &RecordingOptions, seen: 
     for view in series.views().iter().filter(|view| matches!(view.source, Source::Observations(_))) {
         image_size(view, None).err().into_iter().for_each(|error| seen.missing(error));
     }
-    series.notices.iter().for_each(|n| seen.note(n));
+    Notice::said_once(&series.notices).iter().for_each(|n| seen.note(n));
     stops(&series, seen);
     if let Some(urdf) = &args.urdf
         && let Err(error) = robot(&series, urdf, seen)
@@ -244,7 +244,7 @@ fn robot(series: &Series, file: &Path, seen: &Examination) -> Result<()> {
         Inputs::with_series(file, vec![series.clone()], Ends::default())?;
     let moving = chain.readings.join(", ");
     seen.good("urdf", &format!("{} ({} to {}; {moving})", description.name, chain.base, chain.tip));
-    tip_notice.iter().chain(&description.notices).for_each(|n| seen.note(n));
+    tip_notice.iter().chain(&Notice::said_once(&description.notices)).for_each(|n| seen.note(n));
     let readings = readings_of(series, &chain)?;
     series.reading_notices(&chain).iter().for_each(|n| seen.note(n));
     seen.good("readings", &format!("{} stops with a value for every joint", readings.iter().flatten().count()));

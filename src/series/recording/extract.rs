@@ -526,7 +526,9 @@ mod tests {
         let (postures, times) = recorded(&[(100, false), (80, true)].repeat(4));
         let later: Vec<i64> = times.iter().map(|t| t + 3_600_000_000_000).collect();
         let refused = |notices: Vec<Notice>| {
-            require_overlap(&Scan { notices, ..Scan::default() }, &postures, &later).unwrap_err()
+            let mut scan = Scan::default();
+            scan.notices.extend(notices);
+            require_overlap(&scan, &postures, &later).unwrap_err()
         };
         let [told, untold] = [vec![set], Vec::new()].map(refused);
         assert_eq!([told.code, untold.code], [Code::ClocksApart; 2]);
