@@ -373,3 +373,21 @@ fn a_target_made_of_parts_of_others_is_computed() {
         assert_told(&cell, &format!("MoveAbsJ #,v1,z1,tGun;\nMoveAbsJ {target},v1,z1,tGun;"), 1, &[computed]);
     }
 }
+
+/// Under `EGMRunPose` and `EGMRunJoint` the robot goes where something else tells it.
+#[test]
+fn behind_a_guided_motion_the_posture_is_not_known() {
+    let cell = Cell::kuka(100);
+    let end = "v1,z1,tGun\\WObj:=wTable;";
+    let begin = "ConfL\\Off;\nMoveAbsJ #,v1,z1,tGun;\n";
+    for (between, is_known) in [
+        ("WaitTime 1;", true),
+        ("EGMRunPose id,EGM_STOP_HOLD\\x;", false),
+        ("EGMRunJoint id,EGM_STOP_HOLD\\J1;", false),
+    ] {
+        let told = run(&cell, &format!("{begin}{between}\nMoveL @,{end}"), &[]).1.told();
+        let left: Vec<_> = told.left.iter().map(|(.., reason)| reason.as_str()).collect();
+        let wanted = if is_known { vec![] } else { vec![LeftReason::PostureUnknown.name()] };
+        assert_eq!(left, wanted, "{between}");
+    }
+}

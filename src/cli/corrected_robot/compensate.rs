@@ -85,7 +85,7 @@ pub struct CompensateArgs {
     /// External axes of the program that the description lacks move neither robot nor work (a gun, a gripper)
     #[arg(long, help_heading = "How the program is read")]
     axes_apart: bool,
-    /// Joint values near which a pose is reached where nothing tells its posture and from where the robot comes (the first pose): deg, of prismatic joints mm, in the order of --axes, separated by commas
+    /// Joint values near which a pose is reached where nothing tells its posture and from where the robot comes (the first pose), and where a rail or another external axis stands that it leaves out: deg, of prismatic joints mm, in the order of --axes, separated by commas
     #[arg(
         long,
         value_name = "VALUES",
