@@ -1,6 +1,7 @@
 //! An arm on a rail that the description has: where the rail stands when a target does not say so.
 
 use std::collections::BTreeMap;
+use std::process::Command;
 
 use crate::programs_support::text::{START, UNCHECKED, beside};
 use crate::programs_support::{assert_meets, status_turn};
@@ -275,4 +276,39 @@ fn robtargets_of_an_arm_with_seven_joints_are_left_and_its_jointtargets_correcte
             assert_meets(&real.base_from_tip(readings), &nominal.base_from_tip(&q), "seven joints");
         }
     }
+}
+
+/// The turntable that carries the work comes first in the chain, and is `E1` in programs.
+#[test]
+fn joints_that_carry_the_work_are_external_axes() {
+    let folder = tempfile::tempdir().unwrap();
+    let turntable = "<link name=\"world\"/><link name=\"plate\"/><joint name=\"foot\" type=\"fixed\"><parent link=\"world\"/>\
+                     <child link=\"base_link\"/></joint><joint name=\"turn\" type=\"revolute\"><origin xyz=\"0.6 0 0.3\"/>\
+                     <parent link=\"world\"/><child link=\"plate\"/><axis xyz=\"0 0 1\"/>\
+                     <limit lower=\"-3\" upper=\"3\" effort=\"1\" velocity=\"1\"/></joint></robot>";
+    let nominal = std::fs::read_to_string(kr6_urdf()).unwrap().replace("</robot>", turntable);
+    let real = nominal.replace("0.025 0 0", "0.0256 0.0003 0.0004").replace("0.42 0 0", "0.4195 0.0006 0");
+    let paths = [("nominal.urdf", &nominal), ("real.urdf", &real)].map(|(name, text)| {
+        std::fs::write(folder.path().join(name), text).unwrap();
+        folder.path().join(name)
+    });
+    let robots =
+        paths.each_ref().map(|path| Robot::nominal(read(path).unwrap().chain(Some("plate"), Some("tool0")).unwrap()));
+    let program = folder.path().join("a.src");
+    std::fs::write(&program, format!("DEF a()\nPTP {}\nEND\n", axes(",E1 30.0"))).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
+    command.arg("compensate").arg(&program).arg("--out").arg(folder.path().join("out"));
+    command.arg("--nominal").arg(&paths[0]).arg("--urdf").arg(&paths[1]);
+    let output = command.args(["--frames", "nominal", "--base", "plate", "--tip", "tool0"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stdout));
+    let text = std::fs::read_to_string(folder.path().join("out/a.src")).unwrap();
+    let line = text.lines().nth(1).unwrap();
+    let values: Vec<f64> =
+        line.split([',', '}']).filter_map(|part| part.split(' ').next_back()?.parse().ok()).collect();
+    assert!(line.ends_with(",E1 30.0}") && values.len() == 7, "{line}");
+    let q: Vec<f64> = [6, 0, 1, 2, 3, 4, 5].map(|k| values[k].to_radians()).to_vec();
+    let meant: Vec<f64> = std::iter::once(30f64.to_radians()).chain(START).collect();
+    assert!(values[0] != START[0].to_degrees(), "{line}");
+    let (rad, m) = robots[1].base_from_tip(&q).distance(&robots[0].base_from_tip(&meant));
+    assert!(rad < 1e-6 && m < 1e-6, "{line}: {m:e} m, {rad:e} rad");
 }
