@@ -44,7 +44,7 @@ use untold::Untold;
 use uses::Use;
 use value::{
     Displacement, NO_AXIS, Node, TYPES, array_of, check, computed, element, foreign_axis, is_of_external_axes,
-    is_set, node, numbers, undeclared,
+    is_placeholder, is_set, node, numbers, undeclared,
 };
 
 const DIALECT: Dialect =
@@ -365,6 +365,9 @@ impl Task<'_> {
         if is_of_external_axes(value) {
             let words = "it moves external axes alone: the arm stays where it is";
             return Err(Why::new(LeftReason::NotATarget, words));
+        }
+        if is_placeholder(value) {
+            return Err(Why::new(LeftReason::NotATarget, "its quaternion is zero: it has no value yet"));
         }
         self.goes_as_told(parts.len() == 2, &external)?;
         if parts.len() == 2 {
