@@ -12,6 +12,7 @@ use super::field::Edit;
 use super::text_file::TextFile;
 use crate::geom::{adjoint, exp_so3};
 use crate::model::robot::{Posture, Robot};
+use crate::urdf::Joint;
 
 /// An angle this near to a border (rad) belongs to both sides.
 const BORDER: f64 = 1e-5;
@@ -53,7 +54,7 @@ pub struct Branch {
 }
 
 impl Branch {
-    /// Of the arm with these six axes (readings) at `q`; the base frame's x is forward.
+    /// Of the arm with these six axes (readings) at `q`; its foot's x is forward.
     pub fn of(robot: &Robot, axes: &[usize; 6], q: &[f64]) -> Self {
         let k = robot.kinematics(&Posture::at(q), &vec![0.0; q.len()]);
         let to_base = adjoint(&k.base_from_tip);
@@ -65,7 +66,8 @@ impl Branch {
         let ((d1, p1), (_, p2), (d3, p3)) = (line(0), line(1), line(2));
         let wrist = nearest_to(line(4), line(5));
         let out = (wrist - p1) - d1 * d1.dot(&(wrist - p1));
-        let forward = exp_so3(&(d1 * q[axes[0]])) * (Vector3::x() - d1 * d1.x);
+        let x = foot_x(robot, axes[0], q);
+        let forward = exp_so3(&(d1 * q[axes[0]])) * (x - d1 * d1.dot(&x));
         let a5 = q[axes[4]];
         Self {
             behind: out.dot(&forward) < 0.0,
@@ -81,6 +83,17 @@ impl Branch {
     fn cfx(self) -> i64 {
         i64::from(self.behind) << 2 | i64::from(!self.elbow) << 1 | i64::from(self.flipped)
     }
+}
+
+/// The x axis of the foot of the arm in the base: the base of the chain, or, where a rail or another moving joint lies below axis 1, the link that
+/// carries that axis.
+fn foot_x(robot: &Robot, first: usize, q: &[f64]) -> Vector3<f64> {
+    let is_first = |joint: &Joint| joint.drive.as_ref().is_some_and(|drive| drive.reading == first);
+    let below = robot.chain.joints.iter().take_while(|joint| !is_first(joint));
+    let moving = below.clone().any(|joint| joint.drive.is_some());
+    let carrier = below.count().checked_sub(1).filter(|_| moving);
+    let pose = carrier.and_then(|k| robot.link_poses(q).get(k).copied());
+    pose.map_or_else(Vector3::x, |pose| pose.rotation.column(0).into_owned())
 }
 
 /// Point of line `a` nearest to line `b` (direction and point each).

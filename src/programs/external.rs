@@ -8,6 +8,11 @@ use super::reason::Why;
 /// What RAPID writes for an external axis that a target does not use (ABB, *Technical reference manual: RAPID Instructions, Functions and Data types*, `extjoint`), and beyond.
 pub(super) const NO_AXIS: f64 = 9e9;
 
+/// Axes of the arm in the languages of programs; those behind them are external.
+const ARM_AXES: usize = 6;
+/// External axes of KRL (`E1` to `E6`) and of RAPID (`eax_a` to `eax_f`).
+const EXTERNAL_AXES: usize = 6;
+
 /// Those that may stand elsewhere than at zero, by their number from 0: in the unit of the program, `None` where the text does not tell where.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct OffZero(BTreeMap<usize, Option<f64>>);
@@ -25,6 +30,36 @@ impl OffZero {
     pub fn why_kept(&self, leaves_out: impl Fn(usize) -> bool, name: impl Fn(usize) -> String) -> Option<Why> {
         let (axis, place) = self.0.iter().find(|(axis, _)| leaves_out(**axis))?;
         Some(Why::external_kept(&name(*axis), *place))
+    }
+}
+
+/// Where the texts put external axes, wherever that is, by their number from 0: in the unit of the program, `None` where they do not tell.
+#[derive(Debug, Clone, Default)]
+pub(super) struct PutAnywhere(Vec<(usize, Option<f64>)>);
+
+impl PutAnywhere {
+    /// A text puts an axis there.
+    pub fn note(&mut self, axis: usize, place: Option<f64>) {
+        self.0.push((axis, place));
+    }
+
+    /// A text may put any of them anywhere.
+    pub fn note_all(&mut self) {
+        self.0.extend((0..EXTERNAL_AXES).map(|axis| (axis, None)));
+    }
+
+    /// Those that the texts put elsewhere than at zero, at places that count as not known.
+    pub fn off_zero(&self) -> OffZero {
+        OffZero(self.0.iter().filter(|(_, place)| *place != Some(0.0)).map(|(axis, _)| (*axis, None)).collect())
+    }
+
+    /// Those of the description, by their readings: `axes` are the readings of the program's axes, `si` the unit of a reading.
+    pub fn by_reading(&self, axes: &[usize], si: impl Fn(usize) -> f64) -> Vec<(usize, Option<f64>)> {
+        let one = |(axis, place): &(usize, Option<f64>)| {
+            let reading = *axes.get(ARM_AXES + axis)?;
+            Some((reading, place.map(|value| value * si(reading))))
+        };
+        self.0.iter().filter_map(one).collect()
     }
 }
 

@@ -190,6 +190,11 @@ impl<T: Followed> Flow<T> {
         self.named.is_seen(name, self.file)
     }
 
+    /// True where a routine of the files calls one of this name.
+    pub fn is_called(&self, name: &str) -> bool {
+        self.meant(name).iter().any(|meant| self.known.calls.contains_key(meant))
+    }
+
     /// Names of their own of the routines that a call may mean here; in every file they stand for the same.
     pub fn meant(&self, name: &str) -> Vec<String> {
         self.named.meant(name, self.file)

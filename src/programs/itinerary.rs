@@ -13,6 +13,8 @@ type Place = (usize, usize);
 enum Origin {
     /// A target.
     Target(Place),
+    /// Where the robot stood when the program began.
+    Begin,
     /// Where the robot stood when the routine was called.
     Call,
     /// The text does not tell.
@@ -56,6 +58,11 @@ impl Stands {
         Self(BTreeSet::from([Stand::at(from)]))
     }
 
+    /// Where the program begins.
+    pub fn begin() -> Self {
+        Self::at(Origin::Begin)
+    }
+
     fn gone(&self, gone: Gone) -> Self {
         Self(self.0.iter().map(|stand| stand.gone(gone)).collect())
     }
@@ -87,7 +94,7 @@ impl Followed for Stands {
         let least = if end.gone_from_call().is_some() { Gone::Not } else { Gone::Beyond };
         let behind = |stand: &Stand| match stand.from {
             Origin::Call => self.gone(stand.gone.max(least)).0,
-            Origin::Target(_) | Origin::Unknown => BTreeSet::from([stand.gone(Gone::Beyond)]),
+            Origin::Target(_) | Origin::Begin | Origin::Unknown => BTreeSet::from([stand.gone(Gone::Beyond)]),
         };
         Self(end.0.iter().flat_map(behind).collect())
     }
@@ -110,7 +117,8 @@ pub(super) struct Itinerary {
 impl Itinerary {
     /// Nothing visited yet.
     pub fn new() -> Self {
-        let program = Program { files: vec![], targets: vec![], left: vec![], edits: vec![], notices: vec![] };
+        let program =
+            Program { files: vec![], targets: vec![], left: vec![], edits: vec![], notices: vec![], put: vec![] };
         Self { program, visited: BTreeMap::new(), arrivals: BTreeMap::new(), from: Approach::Unknown, open: Vec::new() }
     }
 
@@ -253,18 +261,23 @@ impl Itinerary {
     /// The program with all ways to its targets.
     pub fn finished(mut self) -> Program {
         let index = |place| self.visited.get(&place).copied();
-        let approach = |stand: Stand, is_partial: bool| match stand.from {
-            Origin::Target(place) => index(place).map_or(Approach::Unknown, |k| match stand.gone {
-                Gone::Beyond => Approach::Beyond(k),
-                Gone::Perhaps if is_partial => Approach::Beyond(k),
-                Gone::Perhaps | Gone::Not => Approach::From(k),
-            }),
-            Origin::Call | Origin::Unknown => Approach::Unknown,
+        let approach = |stand: Stand, leaves_out: bool| {
+            let from = match stand.from {
+                Origin::Target(place) => index(place).map_or(Approach::Unknown, Approach::From),
+                Origin::Begin => Approach::Begin,
+                Origin::Call => Approach::Call,
+                Origin::Unknown => Approach::Unknown,
+            };
+            match stand.gone {
+                Gone::Beyond => from.beyond(),
+                Gone::Perhaps if leaves_out => from.beyond(),
+                Gone::Perhaps | Gone::Not => from,
+            }
         };
         for (target, ways) in std::mem::take(&mut self.arrivals) {
             let target = &mut self.program.targets[target];
-            let is_partial = target.kind.is_partial();
-            let arrival = |(stand, posture)| Arrival { from: approach(stand, is_partial), posture };
+            let leaves_out = target.kind.leaves_out();
+            let arrival = |(stand, posture)| Arrival { from: approach(stand, leaves_out), posture };
             target.arrivals = ways.into_iter().map(arrival).collect();
         }
         self.program

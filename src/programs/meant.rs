@@ -10,6 +10,9 @@ use super::program::{Approach, Arrival, MeantPosture, PoseTarget, Program, Targe
 use super::reason::{LeftReason, Why};
 use crate::model::robot::Robot;
 
+/// An external axis that is no further (rad or m) from `--start` stands there.
+const AT_START: f64 = 1e-6;
+
 /// What a target means.
 #[derive(Debug, Clone)]
 pub(super) struct Meant {
@@ -42,7 +45,8 @@ pub(super) fn meant(
     let targets = &program.targets;
     let arrivals = targets.iter().map(arrivals).collect();
     let found = targets.iter().map(|_| Found::Nothing).collect();
-    let mut meaning = Meaning { targets, arrivals, controller, held, finder, found, followed: BTreeSet::new() };
+    let stays = (0..held.len()).map(|i| finder.start(i).is_some_and(|start| stays(program, i, start))).collect();
+    let mut meaning = Meaning { targets, arrivals, controller, held, finder, stays, found, followed: BTreeSet::new() };
     while meaning.finds_more() || meaning.begins_anywhere() {}
     let one = |found| match found {
         Found::Meant(meant, _) => Ok(*meant),
@@ -56,15 +60,10 @@ fn unreached() -> Why {
     Why::new(LeftReason::PostureUnknown, "its posture is not known: nothing leads to it")
 }
 
-/// Which readings of a target the text tells, be it with the target before.
-fn told(kind: &TargetKind, readings: usize, before: Option<&Meant>) -> Vec<bool> {
-    match kind {
-        TargetKind::Joints(joints) => {
-            let own = joints.readings.iter().enumerate();
-            own.map(|(i, q)| q.is_finite() || before.is_some_and(|b| b.told[i])).collect()
-        }
-        TargetKind::Pose(_) => vec![true; readings],
-    }
+/// True where the text puts a reading nowhere else than there, rad or m.
+fn stays(program: &Program, reading: usize, place: f64) -> bool {
+    let is_there = |value: &Option<f64>| value.is_some_and(|value| (value - place).abs() < AT_START);
+    program.put.iter().filter(|(put, _)| *put == reading).all(|(_, value)| is_there(value))
 }
 
 fn arrivals(target: &Target) -> Vec<Arrival> {
@@ -85,6 +84,8 @@ struct Meaning<'a> {
     controller: &'a Robot,
     held: &'a [bool],
     finder: Finder<'a>,
+    /// True for readings that the program puts nowhere else than at `--start`.
+    stays: Vec<bool>,
     found: Vec<Found>,
     /// Targets with the ways that were followed: the number of the arrival, and where it begins.
     followed: BTreeSet<(usize, usize, Approach)>,
@@ -114,14 +115,15 @@ impl Meaning<'_> {
             self.origins(arrival.from, &mut BTreeSet::new(), &mut origins);
             ways.extend(origins.into_iter().map(|origin| (origin, n)));
         }
-        // Where a target tells its posture itself, an unknown way to it says nothing against it.
-        let is_told = self.arrivals[k].iter().all(|arrival| self.tells_itself(k, arrival));
-        let has_known = ways.iter().any(|(origin, _)| *origin != Approach::Unknown);
+        // Where a target tells all of itself, an unknown way to it says nothing against it.
+        let is_told =
+            self.arrivals[k].iter().all(|arrival| self.tells_itself(k, arrival)) && !self.targets[k].kind.is_partial();
+        let has_known = ways.iter().any(|(origin, _)| origin.target().is_some());
         for (origin, n) in ways {
             if matches!(self.found[k], Found::Left(_)) {
                 return;
             }
-            if !(is_told && has_known && origin == Approach::Unknown) {
+            if !(is_told && has_known && origin.target().is_none()) {
                 self.follow(k, n, origin);
             }
         }
@@ -142,7 +144,7 @@ impl Meaning<'_> {
     /// Where a way begins: through targets that are left, in the posture in which the robot came to these.
     fn origins(&self, from: Approach, through: &mut BTreeSet<usize>, all: &mut BTreeSet<Approach>) {
         let Some(k) = from.target() else {
-            all.insert(Approach::Unknown);
+            all.insert(from);
             return;
         };
         match &self.found[k] {
@@ -183,11 +185,7 @@ impl Meaning<'_> {
             None => "from where the text does not tell".to_owned(),
         };
         let ways = format!("the ways {} and {}", place(one), place(other));
-        let is_partial = match &self.targets[k].kind {
-            TargetKind::Joints(joints) => joints.readings.iter().any(|q| !q.is_finite()),
-            TargetKind::Pose(pose) => pose.is_partial(),
-        };
-        if is_partial {
+        if self.targets[k].kind.leaves_out() {
             return Why::new(LeftReason::Incomplete, format!("it leaves numbers out, and {ways} give different ones"));
         }
         let words = format!("its posture is not known: {ways} lead to different ones");
@@ -202,8 +200,8 @@ impl Meaning<'_> {
         });
         let straight = matches!(origin, Approach::From(_));
         let kept = before.filter(|_| straight);
-        let kind = self.completed(&self.targets[k], kept)?;
-        let told = told(&self.targets[k].kind, self.held.len(), kept);
+        let kind = self.completed(&self.targets[k], kept, origin)?;
+        let told = self.told(&self.targets[k].kind, kept, origin);
         let held = |own: Vec<bool>| own.iter().zip(self.held).map(|(a, h)| *a || *h).collect::<Vec<bool>>();
         match &kind {
             TargetKind::Joints(joints) => {
@@ -221,8 +219,42 @@ impl Meaning<'_> {
         }
     }
 
+    /// Which readings of a target the text tells, be it with the target before or with `--start`.
+    fn told(&self, kind: &TargetKind, before: Option<&Meant>, origin: Approach) -> Vec<bool> {
+        let kept = |i: usize| before.is_some_and(|b| b.told[i]) || self.by_start(i, origin).is_some();
+        match kind {
+            TargetKind::Joints(joints) => {
+                joints.readings.iter().enumerate().map(|(i, q)| q.is_finite() || kept(i)).collect()
+            }
+            TargetKind::Pose(_) => vec![true; self.held.len()],
+        }
+    }
+
+    /// Where `--start` has an external axis, at the beginning of the program, or of a routine where no statement puts it elsewhere; rad or m.
+    fn by_start(&self, reading: usize, origin: Approach) -> Option<f64> {
+        let counts = match origin {
+            Approach::Begin => true,
+            Approach::Call => self.stays[reading],
+            Approach::From(_) | Approach::Beyond(_) | Approach::Unknown => false,
+        };
+        self.finder.start(reading).filter(|_| counts)
+    }
+
+    /// Why a pose stays as it is that leaves out an external axis of which nothing tells where it stands.
+    fn axis_untold(&self, reading: usize) -> Why {
+        let name = &self.controller.chain.readings[reading];
+        let remedy = match self.finder.start(reading) {
+            None => "write its place in the target, or give --start",
+            Some(_) => {
+                "write its place in the target: --start tells it where the program begins, and at the beginning of a routine where nothing moves it"
+            }
+        };
+        let words = format!("it leaves out {name}, and nothing tells where that stands ({remedy})");
+        Why::new(LeftReason::Incomplete, words)
+    }
+
     /// The target with what its text leaves out, which is what the target before it says.
-    fn completed(&self, target: &Target, before: Option<&Meant>) -> Understood<TargetKind> {
+    fn completed(&self, target: &Target, before: Option<&Meant>, origin: Approach) -> Understood<TargetKind> {
         let unknown =
             || Why::new(LeftReason::Incomplete, "it leaves numbers out, and the target before it is not known");
         let mut kind = target.kind.clone();
@@ -238,13 +270,16 @@ impl Meaning<'_> {
                 }
             }
             TargetKind::Pose(pose) if pose.is_partial() => {
-                let before = before.ok_or_else(unknown)?;
                 for (i, place) in pose.fixed.iter_mut().enumerate() {
                     if place.is_some_and(|value| !value.is_finite()) {
-                        *place = Some(before.told[i].then_some(before.readings[i]).ok_or_else(unknown)?);
+                        let kept = before.filter(|b| b.told[i]).map(|b| b.readings[i]);
+                        *place = Some(kept.or(self.by_start(i, origin)).ok_or_else(|| self.axis_untold(i))?);
                     }
                 }
-                pose.complete(&self.controller.base_from_tip(&before.readings));
+                if pose.is_partial() {
+                    let before = before.ok_or_else(unknown)?;
+                    pose.complete(&self.controller.base_from_tip(&before.readings));
+                }
             }
             TargetKind::Pose(_) => {}
         }

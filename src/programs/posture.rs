@@ -180,6 +180,11 @@ impl<'a> Finder<'a> {
         Self { robot, limits: limits.to_vec(), start, middle, by_code: BTreeMap::new(), rng }
     }
 
+    /// Where `--start` has a reading, rad or m.
+    pub fn start(&self, reading: usize) -> Option<f64> {
+        self.start.map(|start| start[reading])
+    }
+
     /// Joint values of axes that no target told so far.
     pub fn anywhere(&self, reading: usize) -> f64 {
         self.start.map_or(self.middle[reading], |s| s[reading])

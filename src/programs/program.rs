@@ -22,6 +22,8 @@ pub struct Program {
     pub edits: Vec<Edit>,
     /// What the user should know.
     pub notices: Vec<Notice>,
+    /// Where the text puts external axes, wherever that is: by reading, rad or m, `None` where it does not tell.
+    pub put: Vec<(usize, Option<f64>)>,
 }
 
 /// A target that stays as it is.
@@ -94,6 +96,10 @@ pub enum Approach {
     From(usize),
     /// From this target by way of others that the text does not tell: the posture goes on, the direction is not known.
     Beyond(usize),
+    /// From where it stands when the program begins.
+    Begin,
+    /// From where it stands when the routine is called.
+    Call,
     /// The text does not tell.
     Unknown,
 }
@@ -103,7 +109,7 @@ impl Approach {
     pub fn beyond(self) -> Self {
         match self {
             Self::From(k) | Self::Beyond(k) => Self::Beyond(k),
-            Self::Unknown => Self::Unknown,
+            Self::Begin | Self::Call | Self::Unknown => Self::Unknown,
         }
     }
 
@@ -111,7 +117,7 @@ impl Approach {
     pub fn target(self) -> Option<usize> {
         match self {
             Self::From(k) | Self::Beyond(k) => Some(k),
-            Self::Unknown => None,
+            Self::Begin | Self::Call | Self::Unknown => None,
         }
     }
 }
@@ -126,6 +132,14 @@ pub enum TargetKind {
 }
 
 impl TargetKind {
+    /// True where the text leaves readings out, be it those that the target does not have.
+    pub(super) fn leaves_out(&self) -> bool {
+        match self {
+            Self::Joints(joints) => joints.readings.iter().any(|q| !q.is_finite()),
+            Self::Pose(pose) => pose.is_partial(),
+        }
+    }
+
     /// True where the text leaves numbers out that the target has.
     pub(super) fn is_partial(&self) -> bool {
         match self {

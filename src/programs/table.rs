@@ -145,7 +145,7 @@ fn columns(file: &TextFile, header: &Row, setting: &ProgramSetting<'_>) -> Resul
 
 /// Reads one table.
 pub(super) fn read(files: Vec<TextFile>, setting: &ProgramSetting<'_>) -> Result<Program> {
-    let mut program = Program { files, targets: Vec::new(), left: Vec::new(), edits: Vec::new(), notices: Vec::new() };
+    let mut program = Program { files, targets: vec![], left: vec![], edits: vec![], notices: vec![], put: vec![] };
     let mut targets = Vec::new();
     for index in 0..program.files.len() {
         let file = &program.files[index];

@@ -305,3 +305,33 @@ fn what_triggers_and_interrupts_set_for_paths_may_hold_behind_them() {
         ],
     );
 }
+
+/// `TOOL_DATA[1]:{..}` is another frame than `TOOL_DATA[1]`.
+#[test]
+fn frames_behind_with_on_which_something_stands_are_not_known() {
+    use LeftReason::{FrameUnknown, ToolUnknown};
+    let cell = Cell::kuka(190);
+    let data =
+        "DEFDAT $CONFIG\nTOOL_DATA[1]={X 10,Y 0,Z 150,A 0,B 0,C 0}\nBASE_DATA[2]={X 100,Y 0,Z 0,A 0,B 0,C 0}\nENDDAT\n";
+    for (with, left) in [
+        ("$TOOL=TOOL_DATA[1], $BASE=BASE_DATA[2]", None),
+        ("$TOOL=$NULLFRAME:TOOL_DATA[1]", None),
+        ("$BASE=SBASE(2)", None),
+        ("$TOOL=TOOL_DATA[1]:{X 0,Y 0,Z 90,A 0,B 0,C 0}", Some(ToolUnknown)),
+        ("$TOOL={X 0,Y 0,Z 90,A 0,B 0,C 0}:TOOL_DATA[1], $BASE=BASE_DATA[2]", Some(ToolUnknown)),
+        ("$BASE=BASE_DATA[2]:XOFFS", Some(FrameUnknown)),
+        ("$BASE=SBASE(2):XOFFS", Some(FrameUnknown)),
+        ("$BASE=SBASE(1+N)", Some(FrameUnknown)),
+    ] {
+        for body in [format!("SPTP @ WITH {with}\n"), format!("SPLINE WITH {with}\nSPL @\nENDSPLINE\n")] {
+            let files = [("a.src", krl(&cell, &body)), ("$config.dat", data.to_owned())];
+            let (done, reasons) = told(&cell, &files, &[]);
+            let wanted: Vec<String> = left.iter().map(|reason| reason.name().to_owned()).collect();
+            assert_eq!((done, reasons), (1 - wanted.len(), wanted), "{body}");
+        }
+    }
+    for (set, left) in [("BAS(#TOOL,1)", vec![]), ("BAS(#TOOL,0+N)", vec![ToolUnknown.name().to_owned()])] {
+        let files = [("a.src", krl(&cell, &format!("{set}\nSPTP @\n"))), ("$config.dat", data.to_owned())];
+        assert_eq!(told(&cell, &files, &[]), (1 - left.len(), left), "{set}");
+    }
+}

@@ -11,6 +11,7 @@ mod said;
 
 mod across_files;
 mod changing;
+mod external_axes;
 mod frames;
 mod frames_study;
 mod given;

@@ -207,6 +207,10 @@ fn poses_that_leave_out_an_external_axis_are_left_where_it_may_stand_elsewhere_t
         (format!("{}{there}", at("0")), 2, 0),
         (format!("{}{}{there}", at("500"), at("0")), 3, 0),
         (format!("{}{}{there}", at("500"), at("9E9")), 2, 1),
+        // A routine in none of the files may put it back; what waits or sets an output does not.
+        (format!("{}{}rPick;\n{there}", at("500"), at("0")), 2, 1),
+        (format!("{}{}WaitTime 1;\nSetDO do1,1;\nn:=1;\n{there}", at("500"), at("0")), 3, 0),
+        (format!("IndAMove STN1,1\\ToAbsNum:=90,20;\n{there}"), 0, 1),
         (format!("{}sub;\nENDPROC\nPROC sub()\n{there}", at("500")), 1, 1),
     ] {
         let text = format!("MODULE m\nPROC main()\nConfJ\\Off;\n{body}ENDPROC\nENDMODULE\n");

@@ -373,3 +373,48 @@ fn a_target_made_of_parts_of_others_is_computed() {
         assert_told(&cell, &format!("MoveAbsJ #,v1,z1,tGun;\nMoveAbsJ {target},v1,z1,tGun;"), 1, &[computed]);
     }
 }
+
+/// `VAR robtarget p:=[[0,0,0],[0,0,0,0],..]` is how data are declared that get their value later.
+#[test]
+fn a_robtarget_without_a_value_keeps_nothing_else_from_being_corrected() {
+    let cell = Cell::kuka(99);
+    let end = "v1,z1,tGun\\WObj:=wTable;";
+    let none = "[[0,0,0],[0,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]";
+    let declared = format!("VAR robtarget pLater:={none};\n");
+    let [computed, no_target] = [LeftReason::Computed, LeftReason::NotATarget].map(LeftReason::name);
+    for (body, left) in [
+        (format!("MoveJ p1,{end}"), vec![]),
+        (format!("MoveJ p1,{end}\npLater:=CRobT();\nMoveL pLater,{end}"), vec![computed]),
+        (format!("MoveJ p1,{end}\nMoveL pLater,{end}"), vec![no_target]),
+    ] {
+        let text = module(&cell, &body).replace("PROC main()", &format!("{declared}PROC main()"));
+        let file = cell.write("m.mod", text.as_bytes());
+        let told = cell.compensate(&[&file], &["--unordered"]).expect(i32::from(!left.is_empty())).told();
+        assert_eq!(told.corrected, 1, "{body}");
+        assert_eq!(told.left.iter().map(|(.., reason)| reason.as_str()).collect::<Vec<_>>(), left, "{body}");
+    }
+    let tool = "PERS tooldata tLater:=[TRUE,[[0,0,0],[0,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n";
+    let text =
+        module(&cell, "MoveJ p1,v1,z1,tLater\\WObj:=wTable;").replace("PROC main()", &format!("{tool}PROC main()"));
+    let file = cell.write("m.mod", text.as_bytes());
+    let told = cell.compensate(&[&file], &["--unordered"]).expect(1).told();
+    assert_eq!(told.left[0].2, LeftReason::ToolUnknown.name(), "{told:?}");
+}
+
+/// Under `EGMRunPose` and `EGMRunJoint` the robot goes where something else tells it.
+#[test]
+fn behind_a_guided_motion_the_posture_is_not_known() {
+    let cell = Cell::kuka(100);
+    let end = "v1,z1,tGun\\WObj:=wTable;";
+    let begin = "ConfL\\Off;\nMoveAbsJ #,v1,z1,tGun;\n";
+    for (between, is_known) in [
+        ("WaitTime 1;", true),
+        ("EGMRunPose id,EGM_STOP_HOLD\\x;", false),
+        ("EGMRunJoint id,EGM_STOP_HOLD\\J1;", false),
+    ] {
+        let told = run(&cell, &format!("{begin}{between}\nMoveL @,{end}"), &[]).1.told();
+        let left: Vec<_> = told.left.iter().map(|(.., reason)| reason.as_str()).collect();
+        let wanted = if is_known { vec![] } else { vec![LeftReason::PostureUnknown.name()] };
+        assert_eq!(left, wanted, "{between}");
+    }
+}

@@ -95,7 +95,7 @@ fn a_target_with_aligned_wrist_axes_is_singular_wherever_the_cell_stands() {
 }
 
 /// An arm on a rail, and the same one slightly wrong.
-fn on_rail() -> (Chain, Robot) {
+pub(super) fn on_rail() -> (Chain, Robot) {
     let folder = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(kr6_urdf()).unwrap();
     let rail = "<link name=\"rail\"/><joint name=\"slide\" type=\"prismatic\"><parent link=\"rail\"/><child link=\"base_link\"/>\

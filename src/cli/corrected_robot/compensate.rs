@@ -76,7 +76,7 @@ pub struct CompensateArgs {
     /// Unit of the revolute joints in tables
     #[arg(long, value_enum, help_heading = "How the program is read")]
     joint_unit: Option<Unit>,
-    /// Joints in the order of the program's axes, separated by commas [default: as in the URDF, prismatic ones last]
+    /// Joints in the order of the program's axes, separated by commas [default: as in the URDF, those that slide or carry the work last]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = "How the program is read")]
     axes: Vec<String>,
     /// Joints that keep their programmed value, separated by commas
@@ -85,7 +85,7 @@ pub struct CompensateArgs {
     /// External axes of the program that the description lacks move neither robot nor work (a gun, a gripper)
     #[arg(long, help_heading = "How the program is read")]
     axes_apart: bool,
-    /// Joint values near which a pose is reached where nothing tells its posture and from where the robot comes (the first pose): deg, of prismatic joints mm, in the order of --axes, separated by commas
+    /// Joint values near which a pose is reached where nothing tells its posture and from where the robot comes (the first pose), and where a rail or another external axis stands that it leaves out: deg, of prismatic joints mm, in the order of --axes, separated by commas
     #[arg(
         long,
         value_name = "VALUES",
@@ -424,8 +424,10 @@ fn known(flag: &str, name: &str, chain: &Chain) -> Result<usize> {
 fn axes(args: &CompensateArgs, chain: &Chain) -> Result<Vec<usize>> {
     let n = chain.readings.len();
     if args.axes.is_empty() {
-        let turning = |i: &usize| chain.reading_kinds[*i] != JointKind::Prismatic;
-        return Ok((0..n).filter(turning).chain((0..n).filter(|i| !turning(i))).collect());
+        let carries_work: Vec<usize> =
+            chain.joints[..chain.climbed()].iter().filter_map(|joint| Some(joint.drive?.reading)).collect();
+        let is_of_arm = |i: &usize| chain.reading_kinds[*i] != JointKind::Prismatic && !carries_work.contains(i);
+        return Ok((0..n).filter(is_of_arm).chain((0..n).filter(|i| !is_of_arm(i))).collect());
     }
     let axes: Vec<usize> = args.axes.iter().map(|name| known("--axes", name, chain)).collect::<Result<_>>()?;
     let all = (0..n).all(|i| axes.iter().filter(|a| **a == i).count() == 1);

@@ -32,7 +32,7 @@ use scopes::Scopes;
 use uses::Uses;
 
 use super::ProgramSetting;
-use super::external::OffZero;
+use super::external::{OffZero, PutAnywhere};
 use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::names::{plain_error, plain_names};
@@ -117,19 +117,24 @@ fn reading(
         spline: None,
         resumes: false,
         copies: BTreeMap::new(),
+        begins: files.iter().filter(|file| has_moves(file)).count() == 1,
         given: Vec::new(),
         way: Itinerary::new(),
     };
     let mut references = References::default();
+    let mut put = PutAnywhere::default();
     for (index, file) in files.iter().enumerate() {
         module.assigned.look_through(reader(index, file)?, !has_moves(file));
-        off_zero::look_through(&mut module.off_zero_anywhere, reader(index, file)?);
+        off_zero::look_through(&mut put, reader(index, file)?);
         if has_moves(file) {
             module.uses.look_through(reader(index, file)?);
             module.resumes |= calls::resumes(reader(index, file)?);
             calls::look_through(&mut references, reader(index, file)?);
         }
     }
+    module.off_zero_anywhere = put.off_zero();
+    let si = |reading: usize| if module.prismatic[reading] { 1e-3 } else { 1f64.to_radians() };
+    module.way.program.put = put.by_reading(setting.axes, si);
     module.assigned.changed_by_calls(&references);
     // Data first: programs use them in whatever order the files are given.
     for wanted in [false, true] {
@@ -177,6 +182,8 @@ struct Module<'a> {
     resumes: bool,
     /// Names that the routine has copied before any statement of the text above gave them a value, with their copies.
     copies: BTreeMap<String, Vec<String>>,
+    /// True before the first routine of the only file with motions: where no other calls it, the program begins with it.
+    begins: bool,
     /// Variables that routines in none of the files are given.
     given: Vec<Given>,
     way: Itinerary,
@@ -208,8 +215,9 @@ impl Module<'_> {
                 self.leave_at(reader.index, reader.line(), &word, why);
                 self.may_carry();
                 self.time_passes();
-            } else if moves && word == off_zero::BESIDE {
+            } else if moves && (off_zero::BESIDE.contains(&word.as_str()) || word == off_zero::ASYNCHRONOUS) {
                 self.may_carry();
+                self.way.may_go(&mut self.now.1);
             } else if moves && is_beside(&reader) {
                 self.sets_beside(&mut reader);
             } else if moves && self.flow(&reader, &word) {
@@ -330,7 +338,11 @@ impl Module<'_> {
                 self.start_afresh();
                 self.copies = BTreeMap::new();
                 let uncalled = self.begun();
+                let is_first = std::mem::take(&mut self.begins) && !self.flow.is_called(&name);
                 self.flow.routine_begins(name, &mut self.now, &uncalled);
+                if is_first {
+                    self.now.1 = Stands::begin();
+                }
             }
             "RETURN" => self.flow.returns(&self.now),
             "GOTO" => self.flow.jumps(&self.now),

@@ -1,14 +1,17 @@
-//! External axes `E1` to `E6` that a text puts elsewhere than at zero, wherever that is.
+//! Where a text puts the external axes `E1` to `E6`, wherever that is.
 
 use super::aggregate::external_axis;
-use crate::programs::external::OffZero;
+use crate::programs::external::PutAnywhere;
 use crate::programs::scan::{Reader, TokenKind};
 
-/// Moves external axes beside the program.
-pub(super) const BESIDE: &str = "ASYPTP";
+/// Statements that move external axes beside the program, or let others do so (KUKA, *Operating and programming instructions for system integrators*,
+/// asynchronous axes).
+pub(super) const BESIDE: [&str; 4] = ["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"];
+/// The axes that are moved so.
+pub(super) const ASYNCHRONOUS: &str = "$ASYNC_AXIS";
 
-/// Notes the external axes that a text puts elsewhere than at zero, at places that count as not known.
-pub(super) fn look_through(all: &mut OffZero, mut reader: Reader<'_>) {
+/// Notes the external axes that a text puts somewhere.
+pub(super) fn look_through(all: &mut PutAnywhere, mut reader: Reader<'_>) {
     let mut open = Vec::new();
     while !reader.done() {
         match reader.peek().map(|token| token.kind) {
@@ -25,8 +28,6 @@ pub(super) fn look_through(all: &mut OffZero, mut reader: Reader<'_>) {
         reader.take_mark(b'=');
         let number = reader.take_number().map(|(value, _)| value);
         let ends = reader.at_line_end() || reader.is_mark(b',') || reader.is_mark(b'}');
-        if number != Some(0.0) || !ends {
-            all.put(axis, None);
-        }
+        all.note(axis, number.filter(|_| ends));
     }
 }

@@ -1,6 +1,6 @@
 //! Frames as statements state them: `$TOOL`, `$BASE`, `BAS(..)`, motion data, and what stands behind `WITH`.
 
-use super::aggregate::{Aggregate, index};
+use super::aggregate::Aggregate;
 use super::frames::{FrameIs, Frames, OwnFrames};
 use super::moves::NULL_FRAME;
 use super::{Module, Value};
@@ -128,18 +128,18 @@ impl Module<'_> {
         }
         let called = reader.ahead_is_mark(1, b'(');
         if !called {
-            let value = match reader.is_mark(b'{') {
-                true => Aggregate::read(reader).map(Value::Aggregate),
-                false => {
-                    let name = reader.name();
-                    reader.at += 1;
-                    Ok(name.map_or(Value::Expression, |n| Value::Name(n + &index(reader))))
-                }
-            };
+            let value = self.value(reader);
             return value.map_or_else(|e| FrameIs::untold(e.what), |v| self.frame(&v));
         }
+        // Something may stand on it: `SBASE(2):{X 10}`.
+        let close = reader.closing(reader.at + 1);
+        let is_displaced = close.is_none_or(|close| reader.token_is_mark(close + 1, b':'));
         reader.at += 2;
-        if let Some((n, _)) = reader.take_number() {
+        let stated = reader.take_number().filter(|_| close == Some(reader.at));
+        if is_displaced {
+            return self.frame(&Value::Expression);
+        }
+        if let Some((n, _)) = stated {
             return self.numbered(table, n as i64);
         }
         let data = reader.name().map(Value::Name).unwrap_or(Value::Expression);
@@ -169,7 +169,7 @@ impl Module<'_> {
         let what = reader.name();
         reader.at += 1;
         reader.take_mark(b',');
-        let number = reader.take_number().map(|(n, _)| n as i64);
+        let number = reader.take_number().filter(|_| reader.is_mark(b')')).map(|(n, _)| n as i64);
         let frame = |table| match number {
             Some(n) => self.numbered(table, n),
             None => FrameIs::untold("its number is computed"),

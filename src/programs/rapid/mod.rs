@@ -8,6 +8,7 @@ mod moves;
 mod off_zero;
 mod scopes;
 mod statements;
+mod still;
 mod switched;
 mod switching;
 mod untold;
@@ -36,15 +37,15 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
-use moves::{is_of_joints, is_to_joints};
+use moves::{MoveSwitches, is_of_joints, is_to_joints};
 use scopes::Scopes;
 use switched::Watched;
 use switching::{Now, Switching};
 use untold::Untold;
 use uses::Use;
 use value::{
-    Displacement, Node, TYPES, array_of, check, computed, element, foreign_axis, is_of_external_axes, is_set, node,
-    numbers, undeclared,
+    Displacement, Node, TYPES, array_of, check, computed, element, foreign_axis, is_of_external_axes, is_placeholder,
+    is_set, node, numbers, undeclared,
 };
 
 const DIALECT: Dialect =
@@ -95,7 +96,7 @@ fn reading(
         bases: BTreeMap::new(),
         uses: BTreeMap::new(),
         switching: Switching::new(known, scopes.routines()),
-        is_led: false,
+        move_switches: MoveSwitches::default(),
         way: Itinerary::new(),
     };
     let mut references = References::default();
@@ -108,6 +109,7 @@ fn reading(
         task.switching.look_through(reader(file)?);
     }
     task.changed_by_calls(&references);
+    task.way.program.put = task.switching.put_anywhere.by_reading(setting.axes, |reading| task.unit(reading).0);
     for file in files.iter().enumerate() {
         task.way.start_afresh();
         task.statements(reader(file)?)?;
@@ -127,8 +129,8 @@ struct Task<'a> {
     uses: BTreeMap<String, Vec<Use>>,
     /// What instructions switch for those behind them.
     switching: Switching,
-    /// True while something else corrects the path of the move that is being read.
-    is_led: bool,
+    /// What switches of the move say that is being read.
+    move_switches: MoveSwitches,
     way: Itinerary,
 }
 
@@ -365,6 +367,10 @@ impl Task<'_> {
             let words = "it moves external axes alone: the arm stays where it is";
             return Err(Why::new(LeftReason::NotATarget, words));
         }
+        if is_placeholder(value) {
+            return Err(Why::new(LeftReason::NotATarget, "its quaternion is zero: it has no value yet"));
+        }
+        self.goes_as_told(parts.len() == 2, &external)?;
         if parts.len() == 2 {
             let frames = Box::new(self.beside_joints(tool, work));
             return Ok(TargetKind::Joints(JointTarget { frames, ..self.joints(&parts[0], &external?, file)? }));
@@ -373,7 +379,7 @@ impl Task<'_> {
             let words = "a program displacement (PDispOn, PDispSet) may be active";
             return Err(Why::new(LeftReason::FrameUnknown, words));
         }
-        if self.is_led {
+        if self.move_switches.is_led {
             let words = "a sensor or the program moves the tool off it (\\Corr, \\Track)";
             return Err(Why::new(LeftReason::FrameUnknown, words));
         }
@@ -400,11 +406,6 @@ impl Task<'_> {
             return Err(Why::external(&axis, value));
         }
         self.keeps_at_zero(&external)?;
-        let has_external = external.iter().any(|(value, _)| *value < NO_AXIS);
-        if *self.switching.now().offset.value() && has_external && !self.setting.axes_apart {
-            let words = "an offset of external axes (EOffsOn, EOffsSet) may be active";
-            return Err(Why::new(LeftReason::ExternalAxis, words));
-        }
         let mut fixed = vec![None; axes.len()];
         for (&reading, (value, _)) in axes.iter().skip(6).zip(&external) {
             fixed[reading] = Some(if *value < NO_AXIS { value * self.unit(reading).0 } else { f64::NAN });

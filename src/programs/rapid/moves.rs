@@ -10,6 +10,15 @@ pub(super) struct Targets {
     pub count: usize,
 }
 
+/// What the switches of a move say.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct MoveSwitches {
+    /// True where something else corrects the path.
+    pub is_led: bool,
+    /// True where no offset of external axes counts.
+    pub has_no_offset: bool,
+}
+
 /// The first argument.
 const ONE: Targets = Targets { skipped: 0, count: 1 };
 /// The point on a circle, and its end.

@@ -1,7 +1,7 @@
-//! External axes that targets, and assignments to them, put elsewhere than at zero.
+//! Where targets, and assignments to them, put external axes.
 
 use super::value::{Node, node};
-use crate::programs::external::{NO_AXIS, OffZero};
+use crate::programs::external::{NO_AXIS, PutAnywhere};
 use crate::programs::scan::Reader;
 
 /// Where a target puts its external axes, by their number from 0; `None` where it does not tell of any, or has none of its own.
@@ -13,13 +13,11 @@ pub(super) fn places(target: &Node) -> Option<Vec<(usize, Option<f64>)>> {
     Some(all.filter(|(_, place)| place.is_none_or(|value| value < NO_AXIS)).collect())
 }
 
-/// Notes the external axes that a target, or an assignment to one of them, puts elsewhere than at zero where the reader stands.
-pub(super) fn external_axes(all: &mut OffZero, reader: &mut Reader<'_>) {
+/// Notes where a target, or an assignment to one of them, puts external axes where the reader stands.
+pub(super) fn external_axes(all: &mut PutAnywhere, reader: &mut Reader<'_>) {
     let start = reader.at;
-    let mut put = |places: Vec<(usize, Option<f64>)>| {
-        let off_zero = places.into_iter().filter(|(_, place)| *place != Some(0.0));
-        off_zero.for_each(|(axis, _)| all.put(axis, None));
-    };
+    let mut put =
+        |places: Vec<(usize, Option<f64>)>| places.into_iter().for_each(|(axis, place)| all.note(axis, place));
     let letter = reader.name().filter(|_| reader.ahead_is_mark(-1, b'.'));
     let axis = letter.and_then(|name| "ABCDEF".find(name.strip_prefix("EAX_")?));
     if let Some(axis) = axis.filter(|_| reader.ahead_is_mark(1, b':') && reader.ahead_is_mark(2, b'=')) {

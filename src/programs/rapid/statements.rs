@@ -1,8 +1,7 @@
 //! Statements of RAPID: where each begins and ends, and which of them move.
 
 use super::Task;
-use super::carried::ALONE;
-use super::moves::{Targets, targets_of};
+use super::moves::{MoveSwitches, Targets, targets_of};
 use super::switching::{ROUTINES, words_before_name};
 use super::value::{Node, TYPES, node};
 use crate::error::{Code, Error, Result};
@@ -42,6 +41,8 @@ pub(super) const CONTROL: [&str; 26] = [
 ];
 /// Switches of a move whose path something else corrects: `CorrWrite`, a sensor that tracks the seam.
 const LED: [&str; 2] = ["CORR", "TRACK"];
+/// The switch of a move to joints that no offset of external axes moves.
+const NO_OFFSET: &str = "NOEOFFS";
 /// Words between two operands.
 pub(super) const OPERATORS: [&str; 6] = ["AND", "OR", "XOR", "NOT", "DIV", "MOD"];
 
@@ -150,8 +151,7 @@ struct Arguments {
     plain: Vec<Argument>,
     /// The work object, behind its switch.
     work: Option<Node>,
-    /// True where something else corrects the path.
-    is_led: bool,
+    switches: MoveSwitches,
 }
 
 /// One that stands between commas.
@@ -173,7 +173,8 @@ fn arguments(reader: &mut Reader<'_>, (name, line): (&str, usize)) -> Result<Arg
         }
         if reader.take_mark(b'\\') {
             let (name, value) = switch(reader)?;
-            read.is_led |= LED.contains(&name.as_str());
+            read.switches.is_led |= LED.contains(&name.as_str());
+            read.switches.has_no_offset |= name == NO_OFFSET;
             read.work = value.filter(|_| name == "WOBJ").or(read.work);
         } else if reader.is_mark(b';') {
             return Ok(read);
@@ -262,9 +263,7 @@ impl Task<'_> {
             self.leave((reader.index, reader.line()), word, Why::new(LeftReason::NotATarget, words));
             self.may_carry();
         }
-        if word == ALONE {
-            self.may_carry();
-        }
+        self.may_go(reader, word);
         let start = reader.at;
         let used = self.used(reader, word, end);
         reader.at = start;
@@ -281,8 +280,8 @@ impl Task<'_> {
         let line = reader.line();
         let name = String::from_utf8_lossy(reader.word().unwrap_or_default()).into_owned();
         reader.at += 1;
-        let Arguments { mut plain, work, is_led } = arguments(reader, (&name, line))?;
-        self.is_led = is_led;
+        let Arguments { mut plain, work, switches } = arguments(reader, (&name, line))?;
+        self.move_switches = switches;
         plain.drain(..plain.len().min(targets.skipped));
         let count = targets.count.min(plain.len());
         let tool = self.tool_of(&plain, count);
@@ -299,7 +298,7 @@ impl Task<'_> {
                 false => self.may_carry(),
             }
         }
-        self.is_led = false;
+        self.move_switches = MoveSwitches::default();
         Ok(())
     }
 

@@ -11,6 +11,9 @@ pub(super) const DISPLACES: [&str; 2] = ["PDISPON", "PDISPSET"];
 /// Instructions that move external axes, until `EOffsOff`.
 pub(super) const OFFSETS: [&str; 2] = ["EOFFSON", "EOFFSSET"];
 
+/// Instructions that move an axis independently of the targets, until `IndReset` (ABB, *Application manual Controller software*, Independent Axes).
+pub(super) const INDEPENDENT: [&str; 4] = ["INDAMOVE", "INDCMOVE", "INDDMOVE", "INDRMOVE"];
+
 /// Whether confdata count for a kind of move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Watched {
@@ -99,6 +102,8 @@ pub(super) struct Switched {
     pub offset: Switch<bool>,
     /// True where axis 4 may be locked, so that the tool turns as it can.
     pub locked: Switch<bool>,
+    /// True where an axis may be moved independently of the targets.
+    pub independent: Switch<bool>,
     /// External axes that do not stand at zero.
     pub off_zero: Switch<OffZero>,
     /// Trap routines that an interrupt may run at any time.
@@ -107,13 +112,14 @@ pub(super) struct Switched {
 
 impl Switched {
     /// Where nothing has switched anything yet.
-    pub fn new(watched: [Watched; 2], [displaced, offset, locked]: [bool; 3]) -> Self {
-        let [displaced, offset, locked] = [displaced, offset, locked].map(Switch::new);
+    pub fn new(watched: [Watched; 2], [displaced, offset, locked, independent]: [bool; 4]) -> Self {
+        let [displaced, offset, locked, independent] = [displaced, offset, locked, independent].map(Switch::new);
         Self {
             watched: watched.map(Switch::new),
             displaced,
             offset,
             locked,
+            independent,
             off_zero: Switch::new(OffZero::default()),
             beside: Switch::new(BTreeSet::new()),
         }
@@ -125,6 +131,7 @@ impl Switched {
         self.displaced.note(&other.displaced);
         self.offset.note(&other.offset);
         self.locked.note(&other.locked);
+        self.independent.note(&other.independent);
         self.off_zero.note(&other.off_zero);
         self.beside.note(&other.beside);
     }
@@ -135,6 +142,7 @@ impl Switched {
         self.displaced.or_left_by(&end.displaced);
         self.offset.or_left_by(&end.offset);
         self.locked.or_left_by(&end.locked);
+        self.independent.or_left_by(&end.independent);
         self.off_zero.or_left_by(&end.off_zero);
         self.beside.or_left_by(&end.beside);
     }
@@ -147,6 +155,7 @@ impl Switched {
             displaced: self.displaced.anywhere(&top.displaced),
             offset: self.offset.anywhere(&top.offset),
             locked: self.locked.anywhere(&top.locked),
+            independent: self.independent.anywhere(&top.independent),
             off_zero: self.off_zero.anywhere(&top.off_zero),
             beside: self.beside.anywhere(&top.beside),
         }
@@ -160,6 +169,7 @@ impl Followed for Switched {
             displaced: self.displaced.merged(&other.displaced),
             offset: self.offset.merged(&other.offset),
             locked: self.locked.merged(&other.locked),
+            independent: self.independent.merged(&other.independent),
             off_zero: self.off_zero.merged(&other.off_zero),
             beside: self.beside.merged(&other.beside),
         }
@@ -171,6 +181,7 @@ impl Followed for Switched {
             displaced: self.displaced.at_top(),
             offset: self.offset.at_top(),
             locked: self.locked.at_top(),
+            independent: self.independent.at_top(),
             off_zero: self.off_zero.at_top(),
             beside: self.beside.at_top(),
         }
@@ -182,6 +193,7 @@ impl Followed for Switched {
             displaced: self.displaced.behind_call(&end.displaced),
             offset: self.offset.behind_call(&end.offset),
             locked: self.locked.behind_call(&end.locked),
+            independent: self.independent.behind_call(&end.independent),
             off_zero: self.off_zero.behind_call(&end.off_zero),
             beside: self.beside.behind_call(&end.beside),
         }

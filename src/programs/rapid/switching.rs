@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::off_zero::external_axes;
-use super::switched::{DISPLACES, OFFSETS, Switched, Watched, locks, switch};
-use crate::programs::external::OffZero;
+use super::switched::{DISPLACES, INDEPENDENT, OFFSETS, Switched, Watched, locks, switch};
+use crate::programs::external::{OffZero, PutAnywhere};
 use crate::programs::flow::{Branching, Flow, Followed, Places};
 use crate::programs::itinerary::{Itinerary, Stands};
 use crate::programs::routines::Routines;
@@ -58,6 +58,10 @@ pub(super) struct Switching {
     offsets: bool,
     /// True where a routine locks axis 4.
     locks: bool,
+    /// True where a routine moves axes independently of the targets.
+    independents: bool,
+    /// Where the texts put external axes.
+    pub put_anywhere: PutAnywhere,
     /// External axes that the texts put elsewhere than at zero, at places that count as not known.
     pub off_zero_anywhere: OffZero,
     /// Trap routines of all texts that interrupts run.
@@ -75,13 +79,15 @@ pub(super) struct Switching {
 impl Switching {
     /// With what the reading before found, and the routines of the files.
     pub fn new(known: Places<Now>, routines: &Routines) -> Self {
-        let top = Switched::new([Watched::On; 2], [false; 3]);
+        let top = Switched::new([Watched::On; 2], [false; 4]);
         let (now, flow) = ((top.clone(), Stands::default()), Flow::new(known).among(routines));
         Self {
             switched_off: [false; 2],
             displaces: false,
             offsets: false,
             locks: false,
+            independents: false,
+            put_anywhere: PutAnywhere::default(),
             off_zero_anywhere: OffZero::default(),
             connected: BTreeSet::new(),
             now,
@@ -142,10 +148,15 @@ impl Switching {
             self.displaces |= is_of(DISPLACES);
             self.offsets |= is_of(OFFSETS);
             self.locks |= locks(&reader) == Some(true);
-            external_axes(&mut self.off_zero_anywhere, &mut reader);
+            external_axes(&mut self.put_anywhere, &mut reader);
+            if name.as_ref().is_some_and(|word| INDEPENDENT.contains(&word.as_str())) {
+                self.independents = true;
+                self.put_anywhere.note_all();
+            }
             connected(&reader).iter().for_each(|trap| self.connected.extend(self.flow.meant(trap)));
             reader.at += 1;
         }
+        self.off_zero_anywhere = self.put_anywhere.off_zero();
     }
 
     /// A statement that begins with a word.
@@ -171,11 +182,15 @@ impl Switching {
         match word {
             w if ROUTINES.contains(&w) => {
                 way.start_afresh();
-                let uncalled = (self.anything(!line_has(b"main")), Stands::default());
+                let is_main = line_has(b"main");
+                let uncalled = (self.anything(!is_main), Stands::default());
                 self.flow.all_end(&mut self.now);
                 self.flow.routine_begins(routine_name(reader), &mut self.now, &uncalled);
                 // Modules that are not given may call it, too.
                 self.now = self.now.merged(&uncalled, "");
+                if is_main && !self.flow.is_called(&routine_name(reader)) {
+                    self.now.1 = Stands::begin();
+                }
                 self.top = self.now.0.clone();
                 (self.handler, self.may_have_failed) = (None, false);
                 if word == "TRAP" {
@@ -215,7 +230,7 @@ impl Switching {
     /// All that the routines of the files may have switched.
     fn anything(&self, is_displaced: bool) -> Switched {
         let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
-        let on = [self.displaces, self.offsets, self.locks].map(|on| on && is_displaced);
+        let on = [self.displaces, self.offsets, self.locks, self.independents].map(|on| on && is_displaced);
         let mut any = Switched::new(self.switched_off.map(state), on);
         // What ran before may have left them anywhere.
         any.off_zero.begin(self.off_zero_anywhere.clone());
@@ -307,6 +322,8 @@ impl Switching {
             "GOTO" => self.flow.goes_elsewhere(),
             w if DISPLACES.contains(&w) => self.now.0.displaced.set(true),
             w if OFFSETS.contains(&w) => self.now.0.offset.set(true),
+            w if INDEPENDENT.contains(&w) => self.now.0.independent.set(true),
+            "INDRESET" => self.now.0.independent.set(false),
             "PDISPOFF" => self.now.0.displaced.set(false),
             "EOFFSOFF" => self.now.0.offset.set(false),
             _ => {
@@ -325,7 +342,7 @@ impl Switching {
         {
             return;
         }
-        let nothing = (Switched::new([Watched::On; 2], [false; 3]), Stands::default());
+        let nothing = (Switched::new([Watched::On; 2], [false; 4]), Stands::default());
         if let Some((left, _)) = self.flow.behind(routine, &nothing) {
             self.now.0 = self.now.0.merged(&before.0, "");
             self.now.0.or_left_by(&left);

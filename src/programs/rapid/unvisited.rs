@@ -3,7 +3,7 @@
 use super::switched::{DISPLACES, OFFSETS};
 use super::untold::Untold;
 use super::uses::{Does, Use};
-use super::value::{Node, array_of, element, is_of_external_axes, node};
+use super::value::{Node, array_of, element, is_of_external_axes, is_placeholder, node};
 use super::{Datum, Task};
 use crate::error::Result;
 use crate::geom::Pose;
@@ -97,8 +97,8 @@ impl Task<'_> {
             if self.meant(&name) != name && self.declared(&name).is_ok() {
                 continue;
             }
-            // Nothing of it is the arm's.
-            if is_of_external_axes(&value) {
+            // Nothing of it is the arm's, or it has no value yet.
+            if is_of_external_axes(&value) || is_placeholder(&value) {
                 continue;
             }
             let place = (datum.file, datum.line);

@@ -201,8 +201,19 @@ pub(super) fn frame(node: &Node) -> Option<Pose> {
     let Node::List(list) = node else { return None };
     let (trans, rot) = (list.first()?, list.get(1)?);
     let trans = numbers::<3>(trans)?.map(|(v, _)| 1e-3 * v);
-    let [w, x, y, z] = numbers::<4>(rot)?.map(|(v, _)| v);
+    let [w, x, y, z] = numbers::<4>(rot).filter(|q| !is_zero(q))?.map(|(v, _)| v);
     Some(Pose::from_xyz_quaternion(trans, [x, y, z, w]))
+}
+
+/// True for the quaternion of data that have no value yet: `[0,0,0,0]`.
+fn is_zero(quaternion: &[(f64, Range<usize>); 4]) -> bool {
+    quaternion.iter().all(|(value, _)| *value == 0.0)
+}
+
+/// True for a robtarget that has no value yet: its quaternion is zero.
+pub(super) fn is_placeholder(target: &Node) -> bool {
+    let Node::List(parts) = target else { return false };
+    target.is_robtarget() && parts.get(1).and_then(numbers::<4>).is_some_and(|q| is_zero(&q))
 }
 
 /// A declared name whose value is computed.
@@ -229,7 +240,7 @@ pub(super) fn check(kind: &str, name: &str, value: &Node, place: &str) -> Result
         return Err(Error::new(Code::ProgramTargets, place, what, "complete it"));
     }
     let norm = (kind == "ROBTARGET").then(|| numbers::<4>(&parts[1])).flatten();
-    if let Some(q) = norm {
+    if let Some(q) = norm.filter(|q| !is_zero(q)) {
         let norm = q.iter().map(|(v, _)| v * v).sum::<f64>().sqrt();
         if (norm - 1.0).abs() > 0.01 {
             return Err(Error::new(

@@ -1,0 +1,314 @@
+//! An arm on a rail that the description has: where the rail stands when a target does not say so.
+
+use std::collections::BTreeMap;
+use std::process::Command;
+
+use crate::programs_support::text::{START, UNCHECKED, beside};
+use crate::programs_support::{assert_meets, status_turn};
+use crate::retarget::on_rail;
+use crate::robots::{kr6_urdf, repo};
+use robotcal::geom::Pose;
+use robotcal::model::robot::Robot;
+use robotcal::programs::{
+    self, Language, LeftReason, Models, Postures, Program, ProgramSetting, TargetOutcome, TextFile,
+};
+use robotcal::urdf::{Chain, read};
+
+/// Targets by their lines: corrected readings, or the reason for which they stay as they are.
+type Found = BTreeMap<usize, Result<Vec<f64>, LeftReason>>;
+
+/// `axes` are the readings of the program's axes.
+fn read_program(chain: &Chain, axes: &[usize], name: &str, text: &str) -> Program {
+    let setting = ProgramSetting {
+        chain,
+        axes,
+        rad_per_unit: Some(1.0),
+        base: Pose::identity(),
+        tool: None,
+        work: None,
+        axes_apart: false,
+    };
+    let file = TextFile { name: name.into(), bytes: text.as_bytes().to_vec() };
+    programs::read(Language::of_file(name.as_ref()).unwrap(), vec![file], &setting).unwrap()
+}
+
+/// Corrects a program of an arm on a rail, which stands at `start_m` where the program says nothing of it.
+fn corrected(robot: &(Chain, Robot), name: &str, text: &str, start_m: Option<f64>) -> Found {
+    corrected_in(robot, &[1, 2, 3, 4, 5, 6, 0], name, text, start_m)
+}
+
+fn corrected_in((chain, real): &(Chain, Robot), axes: &[usize], name: &str, text: &str, start_m: Option<f64>) -> Found {
+    let program = read_program(chain, axes, name, text);
+    let nominal = Robot::nominal(chain.clone());
+    let models = Models { controller: &nominal, from: &nominal, to: real, frames: None, beyond: [None, None] };
+    let start = start_m.map(|m| std::iter::once(m).chain(START).collect());
+    let done = programs::compensate(&program, models, &Postures { held: vec![false; 7], start });
+    let left = program.left.iter().map(|left| (left.line, Err(left.why.reason)));
+    let outcomes = program.targets.iter().zip(done.outcomes).map(|(target, outcome)| match outcome {
+        TargetOutcome::Done(correction) => (target.line, Ok(correction.corrected)),
+        TargetOutcome::Left(why) => (target.line, Err(why.reason)),
+    });
+    left.chain(outcomes).collect()
+}
+
+/// The flange beside the start, with the rail at `rail_m`.
+fn pose((chain, _): &(Chain, Robot), rail_m: f64) -> Pose {
+    let q: Vec<f64> = std::iter::once(rail_m).chain(beside(1)).collect();
+    Robot::nominal(chain.clone()).base_from_tip(&q)
+}
+
+fn krl_frame(pose: &Pose, more: &str) -> String {
+    let [x, y, z] = pose.xyz().map(|v| 1e3 * v);
+    let [c, b, a] = pose.rpy().map(f64::to_degrees);
+    format!("{{X {x:.7},Y {y:.7},Z {z:.7},A {a:.8},B {b:.8},C {c:.8}{more}}}")
+}
+
+/// A robtarget, whose rail is at `eax` mm.
+fn robtarget(pose: &Pose, eax: &str) -> String {
+    crate::programs_support::text::robtarget(pose, UNCHECKED).replacen("9E9", eax, 1)
+}
+
+/// The real robot meets a pose with the rail at `rail_m`, after the correction of the target of this line.
+fn assert_meets_at(robot: &(Chain, Robot), found: &Found, line: usize, rail_m: f64, what: &str) {
+    let Ok(readings) = &found[&line] else { panic!("{what}: {found:?}") };
+    assert!((readings[0] - rail_m).abs() < 1e-12, "{what}: {readings:?}");
+    assert_meets(&robot.1.base_from_tip(readings), &pose(robot, rail_m), what);
+}
+
+fn axes(more: &str) -> String {
+    let all = START.iter().enumerate().map(|(k, q)| format!("A{} {:.6}", k + 1, q.to_degrees()));
+    format!("{{{}{more}}}", all.collect::<Vec<_>>().join(","))
+}
+
+const BEGIN: &str = "DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n";
+
+/// Axis angles of RAPID, with the rail at `eax` mm.
+fn jointtarget(eax: &str) -> String {
+    let axes = START.map(|q| format!("{:.6}", q.to_degrees())).join(",");
+    format!("[[{axes}],[{eax},9E9,9E9,9E9,9E9,9E9]]")
+}
+
+/// Number of the first line that begins so.
+fn first_line(text: &str, begin: &str) -> usize {
+    1 + text.lines().position(|line| line.starts_with(begin)).unwrap()
+}
+
+fn module(body: &str) -> String {
+    format!("MODULE m\nPROC main()\nConfL\\Off;\nConfJ\\Off;\n{body}ENDPROC\nENDMODULE\n")
+}
+
+#[test]
+fn start_tells_where_the_rail_stands_that_nothing_before_a_pose_tells() {
+    let robot = on_rail();
+    let at = |mm: &str| format!("PTP {}\n", axes(&format!(",E1 {mm}")));
+    let lin = format!("LIN {}\n", krl_frame(&pose(&robot, 0.5), ""));
+    let sub = format!("sub()\nEND\nDEF sub()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{lin}");
+    for body in [
+        lin.clone(),
+        format!("PTP {}\n{lin}", axes("")),
+        // The rail is elsewhere later.
+        format!("{lin}{}", at("700.0")),
+        sub.clone(),
+        format!("{}{sub}", at("500.0")),
+        format!("WHILE $IN[1]\n{lin}{}ENDWHILE\n", at("500.0")),
+    ] {
+        let text = format!("{BEGIN}{body}END\n");
+        let line = first_line(&text, "LIN");
+        assert_meets_at(&robot, &corrected(&robot, "a.src", &text, Some(0.5)), line, 0.5, &text);
+        let without = corrected(&robot, "a.src", &text, None);
+        assert_eq!(without[&line], Err(LeftReason::Incomplete), "{text}");
+    }
+    for body in [
+        format!("{}{sub}", at("700.0")),
+        format!("PTP {{E1 700.0}}\n{lin}"),
+        format!("PTP XHOME\n{lin}"),
+        format!("WHILE $IN[1]\n{lin}{}ENDWHILE\n", at("700.0")),
+    ] {
+        let text = format!("{BEGIN}{body}END\n");
+        let found = corrected(&robot, "a.src", &text, Some(0.5));
+        assert_eq!(found[&first_line(&text, "LIN")], Err(LeftReason::Incomplete), "{text}");
+    }
+    let go = format!("MoveL {},v10,fine,tool0;\n", robtarget(&pose(&robot, 0.5), "9E9"));
+    let elsewhere = format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget("700"));
+    for (body, start, is_met) in [
+        (go.clone(), Some(0.5), true),
+        (go.clone(), None, false),
+        (format!("{go}{elsewhere}"), Some(0.5), true),
+        (format!("SetDO do1,1;\nWaitTime 1;\nn:=1;\n{go}"), Some(0.5), true),
+        (format!("rPick;\n{go}"), Some(0.5), false),
+    ] {
+        let text = module(&body);
+        let line = first_line(&text, "MoveL");
+        let found = corrected(&robot, "m.mod", &text, start);
+        match is_met {
+            true => assert_meets_at(&robot, &found, line, 0.5, &text),
+            false => assert_eq!(found[&line], Err(LeftReason::Incomplete), "{text}"),
+        }
+    }
+}
+
+/// What moves the rail alone, or may move it, puts it where the text does not tell; that of the target before is wrong.
+#[test]
+fn a_rail_that_something_else_has_moved_stands_where_the_text_does_not_tell() {
+    let robot = on_rail();
+    let head = format!("PTP {}\n", axes(",E1 500.0"));
+    let lin = format!("LIN {}\n", krl_frame(&pose(&robot, 0.56), ""));
+    let told = format!("LIN {}\n", krl_frame(&pose(&robot, 0.56), ",E1 560.0"));
+    for moved in ["ASYPTP {E1 560}\n", "ASYCONT {E1 60}\n", "$ASYNC_AXIS=1\n", "PICK()\n"] {
+        // The last one says where the arm is, but not the rail.
+        for between in [String::new(), format!("PTP {}\n", axes(""))] {
+            let text = format!("{BEGIN}{head}{moved}{between}{lin}{told}END\n");
+            let line = first_line(&text, "LIN");
+            let found = corrected(&robot, "a.src", &text, None);
+            assert_eq!(found[&line], Err(LeftReason::Incomplete), "{text}");
+            assert_meets_at(&robot, &found, line + 1, 0.56, &text);
+        }
+    }
+    let head = format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget("500"));
+    let go = |eax: &str| format!("MoveL {},v10,fine,tool0;\n", robtarget(&pose(&robot, 0.56), eax));
+    let arm = format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget("9E9"));
+    let none = "[9E9,9E9,9E9,9E9,9E9,9E9]";
+    for (moved, reason) in [
+        (format!("MoveExtJ [{none},[560,9E9,9E9,9E9,9E9,9E9]],vrot10,fine;\n"), LeftReason::Incomplete),
+        ("MoveExtJ jExt,vrot10,fine;\n".to_owned(), LeftReason::Incomplete),
+        ("SearchExtJ di1,jFound,jExt,vrot10;\n".to_owned(), LeftReason::Incomplete),
+        ("rPick;\n".to_owned(), LeftReason::Incomplete),
+        // It may have moved one of those that the description lacks, too.
+        ("IndAMove STN1,1\\ToAbsNum:=560,20;\nIndReset STN1,1;\n".to_owned(), LeftReason::ExternalAxis),
+        ("IndRMove STN1,1\\ToRelNum:=60,20;\n".to_owned(), LeftReason::ExternalAxis),
+        ("IF a=1 IndCMove STN1,1,20;\n".to_owned(), LeftReason::ExternalAxis),
+    ] {
+        for between in ["", &arm] {
+            let text = module(&format!("{head}{moved}{between}{}{}", go("9E9"), go("560")));
+            let line = first_line(&text, "MoveL");
+            let found = corrected(&robot, "m.mod", &text, None);
+            assert_eq!(found[&line], Err(reason), "{text}");
+            match reason {
+                LeftReason::Incomplete => assert_meets_at(&robot, &found, line + 1, 0.56, &text),
+                _ => assert_eq!(found[&(line + 1)], Err(reason), "{text}"),
+            }
+        }
+    }
+    let all_told = go("560,0,0,0,0,0").replace(",9E9,9E9,9E9,9E9,9E9]", "]");
+    for (reset, is_met) in [("IndReset STN1,1;\n", true), ("", false)] {
+        let text = module(&format!("{head}IndAMove STN1,1\\ToAbsNum:=560,20;\n{reset}{all_told}"));
+        let (line, found) = (first_line(&text, "MoveL"), corrected(&robot, "m.mod", &text, None));
+        match is_met {
+            true => assert_meets_at(&robot, &found, line, 0.56, &text),
+            false => assert_eq!(found[&line], Err(LeftReason::ExternalAxis), "{text}"),
+        }
+    }
+}
+
+/// `MoveAbsJ` without `\NoEOffs` moves external axes by the offset, too.
+#[test]
+fn axis_angles_beside_an_offset_of_the_rail_are_left() {
+    let robot = on_rail();
+    let go = |switch: &str, eax: &str| format!("MoveAbsJ {}{switch},v10,fine,tool0;\n", jointtarget(eax));
+    let set = "EOffsSet [100,0,0,0,0,0];\n";
+    for (body, is_left) in [
+        (format!("{set}{}", go("", "500")), true),
+        (format!("{set}{}", go("\\NoEOffs", "500")), false),
+        (format!("{set}{}", go("", "9E9")), false),
+        (format!("{set}EOffsOff;\n{}", go("", "500")), false),
+        (format!("IF a=1 EOffsOn \\ExeP:=p1,p2;\n{}", go("", "500")), true),
+    ] {
+        let text = module(&body);
+        let line = first_line(&text, "MoveAbsJ");
+        let found = corrected(&robot, "m.mod", &text, None);
+        let reason = found[&line].as_ref().err();
+        assert_eq!(reason, is_left.then_some(&LeftReason::ExternalAxis), "{text}");
+    }
+}
+
+/// Status and turn are those of the arm, wherever its foot looks on the rail.
+#[test]
+fn codes_of_an_arm_that_is_turned_on_its_rail_tell_its_posture() {
+    let text = std::fs::read_to_string(kr6_urdf()).unwrap();
+    let (s, t) = status_turn(&beside(1));
+    for yaw in [0.0f64, 1.2, std::f64::consts::PI, -2.5] {
+        let rail = format!(
+            "<link name=\"rail\"/><link name=\"carriage\"/><joint name=\"slide\" type=\"prismatic\"><parent link=\"rail\"/>\
+             <child link=\"carriage\"/><axis xyz=\"1 0 0\"/><limit lower=\"0\" upper=\"3\" effort=\"1\" velocity=\"1\"/></joint>\
+             <joint name=\"mount\" type=\"fixed\"><origin rpy=\"0 0 {yaw}\"/><parent link=\"carriage\"/>\
+             <child link=\"base_link\"/></joint></robot>"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rail.urdf");
+        std::fs::write(&path, text.replace("</robot>", &rail)).unwrap();
+        let chain = read(&path).unwrap().chain(Some("rail"), Some("tool0")).unwrap();
+        let mut real = Robot::nominal(chain.clone());
+        for (k, joint) in real.chain.joints.iter_mut().enumerate() {
+            joint.origin =
+                joint.origin.perturbed(&nalgebra::Vector6::from_fn(|i, _| 1e-3 * ((3 * k + i) as f64).sin()));
+        }
+        let robot = (chain, real);
+        let target = krl_frame(&pose(&robot, 0.5), &format!(",S {s},T {t},E1 500.0"));
+        let found = corrected(&robot, "a.src", &format!("{BEGIN}PTP {target}\nEND\n"), None);
+        assert_meets_at(&robot, &found, 4, 0.5, &format!("{yaw}"));
+        let Ok(readings) = &found[&4] else { panic!("{found:?}") };
+        let change = readings[1..].iter().zip(beside(1)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(change < 0.1, "{yaw}: {readings:?}");
+    }
+}
+
+/// A robtarget of an arm with seven joints says how its elbow is turned, a jointtarget the angle of its seventh joint.
+#[test]
+fn robtargets_of_an_arm_with_seven_joints_are_left_and_its_jointtargets_corrected() {
+    let chain = read(&repo("robots/lbr_iiwa_14/lbr_iiwa_14.urdf")).unwrap().chain(None, None).unwrap();
+    let mut real = Robot::nominal(chain.clone());
+    for (k, joint) in real.chain.joints.iter_mut().enumerate() {
+        joint.origin = joint.origin.perturbed(&nalgebra::Vector6::from_fn(|i, _| 1e-3 * ((3 * k + i) as f64).sin()));
+    }
+    let q = [0.2f64, 0.5, 0.3, -1.2, 0.4, 0.9, 0.1];
+    let nominal = Robot::nominal(chain.clone());
+    let degrees = q.map(|v| format!("{:.9}", v.to_degrees()));
+    let (arm, seventh) = ([0, 1, 3, 4, 5, 6].map(|k| degrees[k].clone()).join(","), &degrees[2]);
+    let body = format!(
+        "MoveAbsJ [[{arm}],[{seventh},9E9,9E9,9E9,9E9,9E9]],v10,fine,tool0;\nMoveL {},v10,fine,tool0;\n",
+        robtarget(&nominal.base_from_tip(&q), seventh)
+    );
+    for axes in [[0, 1, 3, 4, 5, 6, 2], [0, 1, 2, 3, 4, 5, 6]] {
+        let found = corrected_in(&(chain.clone(), real.clone()), &axes, "m.mod", &module(&body), None);
+        assert_eq!(found[&6], Err(LeftReason::ExternalAxis), "{axes:?}");
+        let Ok(readings) = &found[&5] else { panic!("{found:?}") };
+        if axes[6] == 2 {
+            assert_meets(&real.base_from_tip(readings), &nominal.base_from_tip(&q), "seven joints");
+        }
+    }
+}
+
+/// The turntable that carries the work comes first in the chain, and is `E1` in programs.
+#[test]
+fn joints_that_carry_the_work_are_external_axes() {
+    let folder = tempfile::tempdir().unwrap();
+    let turntable = "<link name=\"world\"/><link name=\"plate\"/><joint name=\"foot\" type=\"fixed\"><parent link=\"world\"/>\
+                     <child link=\"base_link\"/></joint><joint name=\"turn\" type=\"revolute\"><origin xyz=\"0.6 0 0.3\"/>\
+                     <parent link=\"world\"/><child link=\"plate\"/><axis xyz=\"0 0 1\"/>\
+                     <limit lower=\"-3\" upper=\"3\" effort=\"1\" velocity=\"1\"/></joint></robot>";
+    let nominal = std::fs::read_to_string(kr6_urdf()).unwrap().replace("</robot>", turntable);
+    let real = nominal.replace("0.025 0 0", "0.0256 0.0003 0.0004").replace("0.42 0 0", "0.4195 0.0006 0");
+    let paths = [("nominal.urdf", &nominal), ("real.urdf", &real)].map(|(name, text)| {
+        std::fs::write(folder.path().join(name), text).unwrap();
+        folder.path().join(name)
+    });
+    let robots =
+        paths.each_ref().map(|path| Robot::nominal(read(path).unwrap().chain(Some("plate"), Some("tool0")).unwrap()));
+    let program = folder.path().join("a.src");
+    std::fs::write(&program, format!("DEF a()\nPTP {}\nEND\n", axes(",E1 30.0"))).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
+    command.arg("compensate").arg(&program).arg("--out").arg(folder.path().join("out"));
+    command.arg("--nominal").arg(&paths[0]).arg("--urdf").arg(&paths[1]);
+    let output = command.args(["--frames", "nominal", "--base", "plate", "--tip", "tool0"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stdout));
+    let text = std::fs::read_to_string(folder.path().join("out/a.src")).unwrap();
+    let line = text.lines().nth(1).unwrap();
+    let values: Vec<f64> =
+        line.split([',', '}']).filter_map(|part| part.split(' ').next_back()?.parse().ok()).collect();
+    assert!(line.ends_with(",E1 30.0}") && values.len() == 7, "{line}");
+    let q: Vec<f64> = [6, 0, 1, 2, 3, 4, 5].map(|k| values[k].to_radians()).to_vec();
+    let meant: Vec<f64> = std::iter::once(30f64.to_radians()).chain(START).collect();
+    assert!(values[0] != START[0].to_degrees(), "{line}");
+    let (rad, m) = robots[1].base_from_tip(&q).distance(&robots[0].base_from_tip(&meant));
+    assert!(rad < 1e-6 && m < 1e-6, "{line}: {m:e} m, {rad:e} rad");
+}
