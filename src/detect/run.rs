@@ -111,7 +111,7 @@ pub fn detect_series<P: Into<Loaded>>(
     refuse_odd_dots(images, &mut found);
     note_turned(images, &mut found);
     if !found.iter().any(shows) {
-        name_other_kind(images, plate, &picture, &mut found);
+        name_other_kind(images, plate, picture, &mut found);
     }
     found
 }
