@@ -2,7 +2,8 @@
 //!
 //! Score tests ([`crate::solve::Response`]) of columns that the model lacks, one group for each cause that has a remedy of its own. With `n`
 //! equations and `R` the squares of the whitened residuals, whose size the fit itself has estimated, a group of `m` columns removes
-//! `D = s' M^-1 s` of `R`, and `F = D (n' - m) / (R - D)`, `n' = R`, is chi-squared with `m` degrees of freedom where there is no pattern. Of
+//! `D = s' M^-1 s` of `R`, and `F = D (n' - m) / (R - D)`, `n' = R`, is chi-squared with `m` degrees of freedom where there is no pattern. Noise that
+//! is larger where the columns are, as towards the border of the image, makes it larger by `c = tr(M^-1 W) n / (m R)`: it counts as `F / c`. Of
 //! groups beyond chance the one with the largest `F - m ln n` (G. Schwarz 1978) names the cause.
 
 use nalgebra::{DMatrix, DVector, Matrix3x2, SMatrix, Vector2, Vector3};
@@ -150,8 +151,8 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
     let sum: f64 = linear.images().flat_map(|i| i.terms.residuals.iter()).map(|r| r.duv.norm_squared()).sum();
     let rms_px = (sum / points.max(1) as f64).sqrt();
     let of_group = |g: &Group| {
-        let (y, statistic, degrees) = solved(&response, g);
-        let share = statistic / (statistic + squares);
+        let Solved { y, removed, statistic, uneven, degrees } = solved(&response, g);
+        let share = removed / (removed + squares);
         let step = combined(&response.steps[g.first..g.first + y.len()], &y)?;
         let shift = |plate: usize, marker: usize| match g.bearer {
             Bearer::Plate(k) if k == plate => {
@@ -168,7 +169,7 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
             deviate: deviate(statistic, degrees),
             share,
             rms_px: rms_px * share.sqrt(),
-            least_px: rms_px * (least(degrees, limits.pattern_sigmas) / squares).sqrt(),
+            least_px: rms_px * (uneven * least(degrees, limits.pattern_sigmas) / squares).sqrt(),
             gain: statistic - degrees as f64 * n.ln(),
             // Shifts in the plate trade against its size, by which the step moves everything: that is judged by itself.
             moved: (g.pattern != Pattern::PlatePrint).then(|| effects.moved(&step, shift)),
@@ -190,7 +191,7 @@ pub fn camera_shows_pattern(fit: &Fit, camera: usize, limits: &Limits) -> Result
     let groups = placed(Pattern::OF_CAMERA.into_iter().map(|p| (p, Bearer::Camera(camera))));
     let response = response(fit, &groups)?;
     let is_found = |g: &Group| {
-        let (_, statistic, degrees) = solved(&response, g);
+        let Solved { statistic, degrees, .. } = solved(&response, g);
         deviate(statistic, degrees) > limits.pattern_sigmas
     };
     Ok(groups.iter().any(is_found))
@@ -320,27 +321,46 @@ fn polynomials(at: &Vector2<f64>, [low, high]: [usize; 2]) -> Vec<f64> {
     (low..=high).flat_map(|d| (0..=d).map(move |i| (i, d - i))).map(|(i, k)| x[i] * y[k]).collect()
 }
 
-/// `y = M^-1 s`, the statistic `F` and the number of directions that the rest of the fit does not absorb.
-fn solved(response: &Response, group: &Group) -> (DVector<f64>, f64, usize) {
+/// What a group of columns takes.
+struct Solved {
+    /// `M^-1 s`.
+    y: DVector<f64>,
+    /// `F`.
+    removed: f64,
+    /// `F / c`.
+    statistic: f64,
+    /// `c`, where it is more than one.
+    uneven: f64,
+    /// Directions that the rest of the fit does not absorb.
+    degrees: usize,
+}
+
+fn solved(response: &Response, group: &Group) -> Solved {
     let (first, count) = (group.first, group.pattern.columns());
     let scale = response.by_itself.rows(first, count).map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
     let m = response.information.view((first, first), (count, count));
     let scaled = DMatrix::from_fn(count, count, |i, k| m[(i, k)] * scale[i] * scale[k]);
     let score = response.score.rows(first, count).component_mul(&scale);
-    let Some((values, vectors)) = symmetric_eigen(&scaled) else { return (DVector::zeros(count), 0.0, 0) };
+    let none = || Solved { y: DVector::zeros(count), removed: 0.0, statistic: 0.0, uneven: 1.0, degrees: 0 };
+    let Some((values, vectors)) = symmetric_eigen(&scaled) else { return none() };
     let least = (ABSORBED * values.max()).max(LEAST_SHARE);
     let mut y = DVector::zeros(count);
-    let (mut statistic, mut degrees) = (0.0, 0);
+    let w = response.scatter.view((first, first), (count, count));
+    let (mut statistic, mut scatter, mut degrees) = (0.0, 0.0, 0);
     for (value, vector) in values.iter().zip(vectors.column_iter()).filter(|(value, _)| **value > least) {
         let along = vector.dot(&score);
         y += vector * (along / value);
         statistic += along * along / value;
+        let direction = vector.component_mul(&scale);
+        scatter += (w * &direction).dot(&direction) / value;
         degrees += 1;
     }
+    let uneven = scatter * response.equations as f64 / (degrees.max(1) as f64 * response.squares);
+    let uneven = if uneven > 1.0 { uneven } else { 1.0 };
     // One step from a large fault may take more than there is.
     let taken = (statistic / response.squares).min(1.0 - f64::EPSILON);
-    let statistic = taken * (response.squares - degrees as f64).max(1.0) / (1.0 - taken);
-    (y.component_mul(&scale), statistic, degrees)
+    let removed = taken * (response.squares - degrees as f64).max(1.0) / (1.0 - taken);
+    Solved { y: y.component_mul(&scale), removed, statistic: removed / uneven, uneven, degrees }
 }
 
 /// `-X y`.

@@ -16,6 +16,7 @@ use robotcal::study::measured;
 
 use crate::robots::kr6_to_link_6;
 use crate::support::flange::{flange_of, true_from_fitted};
+use crate::support::small::Dice;
 
 /// What is put in, and how much of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,6 +117,46 @@ fn a_pattern_is_named_by_its_cause_and_none_where_there_is_none() {
                 t.pattern, t.statistic, t.degrees, t.deviate, t.gain, t.rms_px, t.least_px, t.moved
             );
         }
+        assert_eq!(cause(&tests, &limits).map(|t| t.pattern), fault.pattern(), "seed {seed} {fault:?}");
+    }
+}
+
+/// The same with noise that is 3.5 times larger in the corners of the image, and stated as the same everywhere.
+fn noisier_at_the_border(made: &SimulatedSeries, seed: u64) -> MeasuredSeries {
+    let (mut series, mut dice) = (seen(made), Dice::new(seed));
+    let half = [f64::from(series.width_px), f64::from(series.height_px)].map(|px| 0.5 * px);
+    for stop in &mut series.stops {
+        let mut own = stop.observations.to_vec();
+        for seen in &mut own {
+            let squares: f64 = (0..2).map(|k| (seen.uv[k] / half[k] - 1.0).powi(2)).sum();
+            let times = 1.0 + 2.5 * (0.5 * squares).powi(2);
+            let beside = 0.02 * (times * times - 1.0).sqrt();
+            seen.uv = seen.uv.map(|uv| uv + dice.normal(beside));
+        }
+        stop.observations = own.into();
+    }
+    series
+}
+
+/// Noise that grows towards the border is no pattern: the statistics of the columns that are largest there stay chi-squared. A pattern is found in it.
+#[test]
+fn noise_that_is_larger_at_the_border_is_no_pattern() {
+    let limits = Limits::default();
+    let tests = |fault: Fault, seed: u64| {
+        let found = stand_alone(&[noisier_at_the_border(&world(fault, seed), seed)], &limits).unwrap();
+        patterns(&found.fit, &limits).unwrap()
+    };
+    let clean: Vec<Vec<_>> = (31..41).into_par_iter().map(|seed| tests(Fault::Clean, seed)).collect();
+    let of = |pattern: Pattern| clean.iter().flatten().filter(move |t| t.pattern == pattern);
+    for pattern in [Pattern::Radial, Pattern::ThinPrism, Pattern::Field] {
+        let [sum, degrees] = of(pattern).fold([0.0; 2], |[s, d], t| [s + t.statistic, d + t.degrees as f64]);
+        println!("{pattern:?}: {:.2} a degree of {degrees}", sum / degrees);
+        // Four standard deviations of chi-squared.
+        assert!(sum < degrees + 4.0 * (2.0 * degrees).sqrt(), "{pattern:?} {sum} of {degrees}");
+    }
+    assert!(clean.iter().all(|tests| cause(tests, &limits).is_none()));
+    for (fault, seed) in [(Fault::ThinPrism(2e-2), 7), (Fault::Field(0.5), 8), (Fault::Parallax(5e-3), 9)] {
+        let tests = tests(fault, seed);
         assert_eq!(cause(&tests, &limits).map(|t| t.pattern), fault.pattern(), "seed {seed} {fault:?}");
     }
 }

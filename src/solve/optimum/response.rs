@@ -8,7 +8,8 @@
 //! ```
 //!
 //! `s` is the score of `y = 0`, `M` its information with everything else estimated; `s' M^-1 s` is chi-squared where `y = 0`, and `y`, `dx`
-//! are the step to the fit with the columns.
+//! are the step to the fit with the columns. Where the noise is not the same everywhere, `s` has the covariance `W = sum_p e_p e_p'` instead, with the
+//! scores `e_p = (E - J X)_p' r_p` of the points (H. White 1980).
 
 use std::borrow::Cow;
 
@@ -34,6 +35,8 @@ pub struct Response {
     pub by_itself: DVector<f64>,
     /// `s`.
     pub score: DVector<f64>,
+    /// `W`.
+    pub scatter: DMatrix<f64>,
     /// `X`, one step a column.
     pub steps: Vec<Step>,
     /// Sum of the squares of the whitened residuals.
@@ -103,8 +106,8 @@ impl<'a> LinearProblem<'a> {
         let mut all = Sums::none(count);
         parts.iter().for_each(|p| all.add(p));
         let information = (&all.information + all.information.transpose()) * 0.5;
-        let Sums { by_itself, score, squares, equations, .. } = all;
-        Response { information, by_itself, score, steps, squares, equations }
+        let Sums { by_itself, score, scatter, squares, equations, .. } = all;
+        Response { information, by_itself, score, scatter, steps, squares, equations }
     }
 }
 
@@ -113,14 +116,22 @@ struct Sums {
     information: DMatrix<f64>,
     by_itself: DVector<f64>,
     score: DVector<f64>,
+    scatter: DMatrix<f64>,
     squares: f64,
     equations: usize,
 }
 
 impl Sums {
     fn none(count: usize) -> Self {
-        let (information, none) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        Self { information, by_itself: none.clone(), score: none, squares: 0.0, equations: 0 }
+        let (zeros, none) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        Self {
+            information: zeros.clone(),
+            by_itself: none.clone(),
+            score: none,
+            scatter: zeros,
+            squares: 0.0,
+            equations: 0,
+        }
     }
 
     fn of(image: &LinearImage, equations: &Equations, columns: &DMatrix<f64>, steps: &[Step]) -> Self {
@@ -147,10 +158,14 @@ impl Sums {
             columns.nrows(),
             equations.sights().flat_map(|s| [s.residual()[0], s.residual()[1]]),
         );
+        let of_points = DMatrix::from_fn(columns.nrows() / 2, count, |p, c| {
+            left[(2 * p, c)] * residuals[2 * p] + left[(2 * p + 1, c)] * residuals[2 * p + 1]
+        });
         Self {
             information: product(&columns.transpose(), &left),
             by_itself: DVector::from_iterator(count, columns.column_iter().map(|c| c.norm_squared())),
             score: columns.tr_mul(&residuals),
+            scatter: product(&of_points.transpose(), &of_points),
             squares: residuals.norm_squared(),
             equations: columns.nrows(),
         }
@@ -160,6 +175,7 @@ impl Sums {
         self.information += &other.information;
         self.by_itself += &other.by_itself;
         self.score += &other.score;
+        self.scatter += &other.scatter;
         self.squares += other.squares;
         self.equations += other.equations;
     }
