@@ -133,6 +133,8 @@ limits! {
     displaced_doubt: f64 = 0.4;
     /// Probability, over all displacements that are looked at, with which Gaussian noise may look like one.
     displaced_false_alarms: f64 = 1e-4;
+    /// The same where each stop has one error that follows its posture: so likely, what seems to follow the tilt is a doubt.
+    displaced_by_posture: f64 = 0.05;
     /// Sigmas per axis that its shift or its turn must be beyond: noise alone reaches them along three axes in 5 %.
     displaced_sigmas: f64 = 2.8;
     /// Displacement from which a result is not to be trusted, m: as far as a good robot repeats.

@@ -13,8 +13,8 @@
 //! has a beta distribution where noise is Gaussian; what the step leaves of `R + P` says how much of them it explains. Priors on several columns together
 //! are part of the information and of `P`. `R` has every direction of the poses that were seen: what two cameras contradict each other by is in it.
 //! Where errors repeat over neighbouring readings, several stops count as one. Real robots err alike in postures that are alike, so that chance alone
-//! does not acquit them: the step must also explain most of `R`; one that explains less, but much, is a doubt. It must be beyond
-//! its own sigmas.
+//! does not acquit them: the step must also explain most of `R`; one that explains less, but much, is a doubt. What follows the posture, as a camera
+//! that its weight moves, must explain more than such errors may, of which a stop has one. It must be beyond its own sigmas.
 //!
 //! Several targets on the tip may be held by one bracket: its twist `x` about their middle moves each of them, `A = sum_k T_k B_k`, with the columns
 //! `T_k` of a target and `B_k = [R' , -R' [d]; 0, R']` of its rotation `R` in the tip and its place `d` from the middle.
@@ -31,7 +31,7 @@ use super::displaced::{Carried, Displaced, Displacement};
 use super::images_shifted::ImagesShifted;
 use super::rows::{Chances, Linear, Part, Step};
 use super::zero_moved::ZeroMoved;
-use crate::assess::{Accuracy, Limits, stops_for_one};
+use crate::assess::{Accuracy, Limits, log_chance as chance_of_share, stops_for_one};
 use crate::diagnose::finding::Finding;
 use crate::diagnose::focus::{self, FocusChange};
 use crate::diagnose::kind::{CheckContext, Weight};
@@ -69,6 +69,11 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
         let share = before.explained(&left, &best);
         tracing::debug!(?best.changed, ?best.order, first = ?best.shown.first(), moved = best.shown.len(), fall = best.fall, share,
             log_chance, change = ?best.change, "step");
+        let explains_most = share > limits.displaced_share && {
+            let stops = linear.stops(best.group) as f64 / chances.stops_for_one;
+            let by_posture = chance_of_share(share, stops, best.told) + (tried.len() as f64).ln();
+            !matches!(best.order, Order::Up(_)) || by_posture < limits.displaced_by_posture.ln()
+        };
         best.change.fill(0.0);
         found.push(best);
         let mut first = columns;
@@ -78,7 +83,7 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
             own.share = all.explained(&left, own);
             first += size;
         }
-        if share > limits.displaced_share {
+        if explains_most {
             found.iter_mut().for_each(|own| own.explains_most = true);
         }
         if share > limits.displaced_doubt {

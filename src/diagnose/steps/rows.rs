@@ -99,7 +99,7 @@ pub struct Step {
     /// Fall of the cost, `D`.
     pub(super) fall: f64,
     /// How many directions of it are told.
-    told: usize,
+    pub(super) told: usize,
     /// Share of the squares `R` that this and the other steps of its series explain.
     pub(super) share: f64,
     /// True where it, or one that was found after it, explains most of what was left.
@@ -263,6 +263,11 @@ impl Linear {
         let mut of_groups = vec![0.0; problem.noise.joint.len()];
         self.rows.iter().for_each(|row| of_groups[row.group] += row.squares(problem, part));
         of_groups
+    }
+
+    /// Number of stops of a series.
+    pub(super) fn stops(&self, group: usize) -> usize {
+        self.rows.iter().filter(|row| row.group == group).count()
     }
 
     /// Squares `P` of the errors of robot, mountings and placements over their priors.
