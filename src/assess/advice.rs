@@ -31,6 +31,9 @@ pub struct Advice {
     pub near: f64,
     /// Where it was, rad or m.
     pub covered: (f64, f64),
+    /// Readings of the stops next to it, below and above, rad or m; none where it lies outside of what was covered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gap: Option<(f64, f64)>,
     /// Share of the variance in question that one such stop removes.
     pub gain: f64,
     /// In words.
@@ -49,7 +52,8 @@ pub(super) struct Adviser<'a> {
     robot: &'a Robot,
     never: &'a Structural,
     covariance: DMatrix<f64>,
-    covered: Vec<(f64, f64)>,
+    /// Readings of the stops in ascending order, for every reading.
+    visited: Vec<Vec<f64>>,
     candidates: Vec<Candidate>,
     limits: &'a Limits,
 }
@@ -65,7 +69,11 @@ impl<'a> Adviser<'a> {
     ) -> Self {
         let readings = robot.chain.readings.len();
         let n = known.columns.len();
-        let range = |r: usize| extent(stops.iter().map(|s| s.readings[r]));
+        let visited = |r: usize| {
+            let mut all: Vec<f64> = stops.iter().map(|s| s.readings[r]).collect();
+            all.sort_by(f64::total_cmp);
+            all
+        };
         let mut candidates = Vec::new();
         for base in stops.iter().step_by((stops.len() / BASES).max(1)).take(BASES) {
             for reading in 0..readings {
@@ -89,7 +97,7 @@ impl<'a> Adviser<'a> {
             robot,
             never,
             covariance: known.covariance.view((0, 0), (n, n)).into_owned(),
-            covered: (0..readings).map(range).collect(),
+            visited: (0..readings).map(visited).collect(),
             candidates,
             limits,
         }
@@ -145,7 +153,8 @@ impl<'a> Adviser<'a> {
                 next.push(Advice {
                     joint: joint.clone(),
                     near: value,
-                    covered: self.covered[reading],
+                    covered: self.covered(reading),
+                    gap: self.gap(reading, value),
                     gain,
                     words: self.words(reading, value),
                 });
@@ -154,9 +163,21 @@ impl<'a> Adviser<'a> {
         next
     }
 
+    fn covered(&self, reading: usize) -> (f64, f64) {
+        extent(self.visited[reading].iter().copied())
+    }
+
+    /// The nearest readings of stops on both sides of a value between them.
+    fn gap(&self, reading: usize, value: f64) -> Option<(f64, f64)> {
+        let visited = &self.visited[reading];
+        let above = visited.partition_point(|q| *q < value);
+        let (below, above) = (*visited.get(above.checked_sub(1)?)?, *visited.get(above)?);
+        (above > value).then_some((below, above))
+    }
+
     fn words(&self, reading: usize, value: f64) -> String {
         let joint = &self.robot.chain.readings[reading];
-        let (low, high) = self.covered[reading];
+        let (low, high) = self.covered(reading);
         let shown = |v: f64| match self.robot.chain.reading_kinds[reading] {
             JointKind::Prismatic => format!("{:.0} mm", 1e3 * v),
             _ => format!("{:.0} deg", v.to_degrees()),
@@ -168,6 +189,10 @@ impl<'a> Adviser<'a> {
                 shown(value)
             );
         }
-        format!("add stops with {joint} near {} (so far {} to {})", shown(value), shown(low), shown(high))
+        let so_far = match self.gap(reading, value) {
+            Some((below, above)) => format!("so far none between {} and {}", shown(below), shown(above)),
+            None => format!("so far {} to {}", shown(low), shown(high)),
+        };
+        format!("add stops with {joint} near {} ({so_far})", shown(value))
     }
 }

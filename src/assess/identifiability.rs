@@ -11,7 +11,7 @@ use super::advice::{Advice, Adviser};
 use super::limits::Limits;
 use super::statistics::extent;
 use super::stops::{StopsKnowledge, Structural, information_of_share, structural};
-use crate::linalg::symmetric_eigen;
+use crate::linalg::{SymmetricFactor, symmetric_eigen};
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Layout, places_body, short_name};
 
@@ -304,14 +304,22 @@ fn correlations(
     }
     pairs.sort_by(|x, y| y.2.abs().total_cmp(&x.2.abs()).then((x.0, x.1).cmp(&(y.0, y.1))));
     pairs.truncate(MOST_PAIRS);
+    let silent = Silent::of(covariance, all, |name| place(name).is_some_and(|k| shares[k] > limits.share_of_data));
     let in_words = |(first, second, rho, a, b): (usize, usize, f64, Option<usize>, Option<usize>)| {
         let mut v = DVector::zeros(robot.len());
         a.into_iter().for_each(|k| v[k] = 1.0);
         b.into_iter().for_each(|k| v[k] = rho.signum());
         let camera = |name: &str| name.starts_with("camera.");
+        let is_size = |k: usize| all[k].starts_with("plate_shape") && all[k].ends_with(".scale");
+        let followed = silent.as_ref().and_then(|s| s.followed([first, second], limits.strong_correlation));
         let remedy = match (camera(&all[first]), camera(&all[second])) {
             (true, true) => "fill the whole image, tilt by 20 to 45 degrees, and vary the distance".to_owned(),
+            _ if [first, second].into_iter().any(is_size) => MEASURE_THE_SIZE.to_owned(),
             _ if v.norm() > 0.0 => adviser.in_words(Some(&v)),
+            _ if followed.is_some() => format!(
+                "{} does the same to both, and only its prior tells it from them: nothing is lost by that",
+                followed.unwrap_or_default()
+            ),
             _ if [first, second].iter().any(|&k| places_body(&all[k])) => {
                 "measure at stops with the tip turned to more different directions".to_owned()
             }
@@ -321,6 +329,43 @@ fn correlations(
         Correlation { first: all[first].clone(), second: all[second].clone(), correlation: rho, remedy }
     };
     pairs.into_iter().map(in_words).collect()
+}
+
+/// What to do where the size of a plate goes with a length of the robot.
+const MEASURE_THE_SIZE: &str =
+    "measure the distance of two far markers and give [scale] in plate.toml: no stop tells the size of the plate";
+
+/// Parameters of the robot that no series can tell, and what all others have to do with them.
+struct Silent<'a> {
+    names: Vec<&'a str>,
+    /// Correlation of every parameter with each of them.
+    with: DMatrix<f64>,
+    /// `R_s^-1 R_s.` for the correlations `R_s` among them.
+    solved: DMatrix<f64>,
+    correlations: DMatrix<f64>,
+}
+
+impl<'a> Silent<'a> {
+    fn of(covariance: &DMatrix<f64>, all: &'a [String], is_silent: impl Fn(&String) -> bool) -> Option<Self> {
+        let rows: Vec<usize> = (0..all.len()).filter(|&k| is_silent(&all[k])).collect();
+        let scale = covariance.diagonal().map(f64::sqrt);
+        let correlations = covariance.map_with_location(|i, j, c| c / (scale[i] * scale[j]));
+        let with = correlations.select_columns(&rows);
+        let solved = SymmetricFactor::new(&with.select_rows(&rows)).ok()?.solve_many(&with.transpose());
+        Some(Self { names: rows.iter().map(|&k| all[k].as_str()).collect(), with, solved, correlations })
+    }
+
+    /// The one that two parameters follow most, where the correlation of the two is no strong one with all of these held.
+    fn followed(&self, [i, j]: [usize; 2], strong: f64) -> Option<&'a str> {
+        let left =
+            |i: usize, j: usize| self.correlations[(i, j)] - self.with.row(i).transpose().dot(&self.solved.column(j));
+        if left(i, j).abs() > strong * (left(i, i) * left(j, j)).max(0.0).sqrt() {
+            return None;
+        }
+        let common = |k: &usize| (self.with[(i, *k)] * self.with[(j, *k)]).abs();
+        let most = (0..self.names.len()).max_by(|a, b| common(a).total_cmp(&common(b)))?;
+        Some(self.names[most])
+    }
 }
 
 /// Poses of two plates, or of two mountings: all hang on the same robot, which makes them move together.

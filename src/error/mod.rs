@@ -47,6 +47,9 @@ impl Error {
             std::io::ErrorKind::NotADirectory => {
                 (Code::FileNotRegular, "a file stands where a folder is wanted: check the path")
             }
+            std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
+                (Code::FileFailed, "the disk (or your share of it) is full: make room, or write to another one")
+            }
             _ => (Code::FileFailed, "check that the disk is readable and not full"),
         };
         Self::new(code, path.display(), error, remedy)

@@ -116,7 +116,11 @@ pub fn read_text(path: &Path, kind: FileKind) -> Result<String> {
 /// # Errors
 /// UTF-16, and bytes that are not UTF-8 by their line.
 pub fn text(origin: &Path, bytes: Vec<u8>) -> Result<String> {
-    let remedy = "save it as UTF-8 (in a spreadsheet: CSV UTF-8)";
+    let is_table = origin.extension().is_some_and(|end| end.eq_ignore_ascii_case("csv"));
+    let remedy = match is_table {
+        true => "save it as UTF-8 (in a spreadsheet: CSV UTF-8)",
+        false => "save it as UTF-8 (in an editor: encoding UTF-8)",
+    };
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(Error::new(Code::TextEncoding, origin.display(), "is UTF-16 text", remedy));
     }

@@ -4,7 +4,8 @@ use super::restore::FoundModel;
 use super::text::number;
 use crate::assess::PredictedFlange;
 use crate::error::{Code, Error, Result};
-use crate::series::to_csv;
+use crate::series::{AngleUnit, to_csv};
+use crate::urdf::JointKind;
 
 /// The flange at every joint vector (rad or m, in the order of the chain).
 ///
@@ -29,10 +30,13 @@ pub fn relative_to(model: &FoundModel) -> &str {
     name.rsplit_once('.').map_or(name, |(body, _)| body)
 }
 
-/// Text of at.csv: readings, pose relative to the plate (a fixed camera), sigmas, joints outside the range of the stops, upper
+/// Text of at.csv: readings (those of revolute joints in `unit`, sliding ones in m), pose relative to the plate (a fixed camera), sigmas, joints outside the range of the stops, upper
 /// triangle of the covariance of the body twist (m, rad, translation first), and relative to what.
-pub fn at_csv(model: &FoundModel, readings: &[Vec<f64>], found: &[PredictedFlange]) -> String {
-    let mut head: Vec<String> = model.robot.chain.readings.clone();
+pub fn at_csv(model: &FoundModel, unit: AngleUnit, readings: &[Vec<f64>], found: &[PredictedFlange]) -> String {
+    let chain = &model.robot.chain;
+    let in_degrees = |kind: &JointKind| unit == AngleUnit::Deg && *kind != JointKind::Prismatic;
+    let written = |(q, kind): (&f64, &JointKind)| if in_degrees(kind) { q.to_degrees() } else { *q };
+    let mut head: Vec<String> = chain.readings.clone();
     let plain = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw", "sigma_mm", "sigma_mrad", "outside"];
     head.extend(plain.map(String::from));
     let upper = || (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
@@ -41,7 +45,7 @@ pub fn at_csv(model: &FoundModel, readings: &[Vec<f64>], found: &[PredictedFlang
     let mut rows = vec![head];
     for (q, f) in readings.iter().zip(found) {
         let [position, rotation] = f.sigmas();
-        let numbers = (q.iter().copied())
+        let numbers = (q.iter().zip(&chain.reading_kinds).map(written))
             .chain(f.pose.xyz())
             .chain(f.pose.quaternion_xyzw())
             .chain([1e3 * position, 1e3 * rotation]);

@@ -7,6 +7,9 @@ use super::inputs::{InputFile, read_text};
 use crate::error::{Code, Error, Result, closest_name, plain_name, renaming};
 use crate::files::FileKind;
 
+/// Columns that name what a row is of: they usually stand first.
+const KEYS: [&str; 4] = ["image", "stop", "name", "id"];
+
 /// One data row.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row<'a> {
@@ -194,7 +197,14 @@ impl Table {
             let what = format!("has no column \"{name}\"; its columns are: {}", self.headers.join(", "));
             let remedy = match closest_name(name, self.headers.iter().map(String::as_str)) {
                 Some(meant) => renaming(meant, name),
-                None => format!("add the column \"{name}\""),
+                None => match self
+                    .headers
+                    .first()
+                    .filter(|first| KEYS.contains(&name) && first.parse::<f64>().is_err() && !first.is_empty())
+                {
+                    Some(first) => format!("rename \"{first}\" to \"{name}\" where it is that, else add this column"),
+                    None => format!("add the column \"{name}\""),
+                },
             };
             Error::new(Code::CsvColumnMissing, self.place_of_header(), what, remedy)
         })

@@ -39,6 +39,7 @@ pub struct RobotDescription {
 /// a zero axis, links or joints of the same name, unknown links, a link with two parents, loops.
 pub fn read(path: &Path) -> Result<RobotDescription> {
     let bytes = files::read(path, FileKind::Robot)?;
+    refuse_no_text(path, &bytes)?;
     let text = String::from_utf8(bytes).map_err(|e| {
         let what = format!("is not UTF-8 text (byte {})", e.utf8_error().valid_up_to());
         Error::new(
@@ -49,6 +50,21 @@ pub fn read(path: &Path) -> Result<RobotDescription> {
         )
     })?;
     RobotDescription::from_text(path, text)
+}
+
+/// Refuses a file that does not begin as XML, whatever encodes it, and is no text.
+fn refuse_no_text(path: &Path, bytes: &[u8]) -> Result<()> {
+    let marks = [&[0xef, 0xbb, 0xbf][..], &[0xff, 0xfe], &[0xfe, 0xff]];
+    let rest = marks.iter().find_map(|mark| bytes.strip_prefix(*mark)).unwrap_or(bytes);
+    let first = rest.iter().find(|b| **b != 0 && !b.is_ascii_whitespace());
+    if first.is_none_or(|b| *b == b'<') || std::str::from_utf8(bytes).is_ok() {
+        return Ok(());
+    }
+    let what = match image::guess_format(bytes) {
+        Ok(_) => "is a picture, no robot description",
+        Err(_) => "is no XML",
+    };
+    Err(Error::new(Code::UrdfSyntax, path.display(), what, "give a URDF file"))
 }
 
 impl RobotDescription {

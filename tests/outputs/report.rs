@@ -1,5 +1,7 @@
 //! The report: complete, self-contained, and safe against whatever stands in names.
 
+use std::process::Command;
+
 use crate::outputs_support::{context, robot, solved};
 use robotcal::diagnose::{DoubtedSize, ExchangedReadings, Finding, OddImage, SmallGain, ToldBy, Weight};
 use robotcal::error::{Code, Notice};
@@ -387,4 +389,48 @@ fn the_page_names_the_files_that_are_there() {
     record.files.extend(["plate.run1.csv".into(), "plate.run2.csv".into()]);
     let page = report_html(&record, &Thumbnails::default());
     assert!(!page.contains("plate.csv") && page.contains("plate.run1.csv") && page.contains("plate.run2.csv"));
+}
+
+/// Where the readings are poses of a controller, there is no arm, no joint and no correction to show.
+#[test]
+fn poses_of_a_controller_alone_show_no_robot() {
+    let mut record = record();
+    let chapter = |page: &str, id: &str| page.contains(&format!("<section id=\"{id}\""));
+    let page = report_html(&record, &Thumbnails::default());
+    assert!(chapter(&page, "corrections") && page.contains("class=\"arm\"") && page.contains("Nominal robot"));
+    record.files.retain(|f| !f.ends_with(".urdf"));
+    let page = report_html(&record, &Thumbnails::default());
+    assert!(!chapter(&page, "corrections") && chapter(&page, "scene") && chapter(&page, "coverage"));
+    for of_a_robot in ["class=\"arm\"", "data-arms", "Nominal robot", "Readings of every joint", "moving joint"] {
+        assert!(!page.contains(of_a_robot), "{of_a_robot}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let said = |record: &solution_json::SolutionRecord| {
+        let file = folder.path().join("solution.json");
+        std::fs::write(&file, solution_json::to_bytes(record).unwrap()).unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_robotcal")).arg("show").arg(file).output().unwrap();
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    for failed in [vec![], vec!["a check".to_owned()]] {
+        record.failed_gates = failed;
+        let text = said(&record);
+        let accuracy: Vec<&str> = text.lines().skip_while(|l| !l.starts_with("accuracy")).take(2).collect();
+        assert!(!accuracy.concat().contains("nominal") && !accuracy.concat().contains("URDF"), "{text}");
+        assert!(accuracy.concat().contains("poses of the controller"), "{text}");
+    }
+}
+
+/// Images that are planned beside those of a result are for the robot model that it chose.
+#[test]
+fn the_robot_model_of_a_result_is_read_from_its_terms() {
+    let full = record();
+    let chain = robotcal::output::restore::exported_model(&full).unwrap().robot.chain;
+    assert_eq!(robotcal::output::plan_start::model_of(&full, &chain), RobotModel::Full);
+    for (model, left) in
+        [(RobotModel::Gear, ["gear", "cos_", "sin_", "offset"].as_slice()), (RobotModel::Rigid, &["offset"])]
+    {
+        let mut record = full.clone();
+        record.robot.terms.retain(|t| left.iter().any(|name| t.term.starts_with(name)));
+        assert_eq!(robotcal::output::plan_start::model_of(&record, &chain), model);
+    }
 }

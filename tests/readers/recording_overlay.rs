@@ -60,3 +60,30 @@ fn camera_frames_and_residuals_of_the_solution_are_in_the_recording() {
         assert!(drawn >= 2 * used && used > 30, "{drawn} points for {used} observations");
     }
 }
+
+/// Of two arms with a tool each, the series says which is meant.
+#[test]
+fn base_and_tip_of_the_series_choose_the_chain_of_its_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::create_dir_all(at("run/images")).unwrap();
+    for name in ["series.toml", "plate.toml", "plate.csv", "images/img_000.png", "images/img_001.png"] {
+        std::fs::copy(repo("datasets/kr6_small").join(name), at("run").join(name)).unwrap();
+    }
+    let joints = std::fs::read_to_string(repo("datasets/kr6_small/joints.csv")).unwrap();
+    std::fs::write(at("run/joints.csv"), joints.lines().take(3).collect::<Vec<_>>().join("\n") + "\n").unwrap();
+    let urdf = std::fs::read_to_string(kr6_urdf()).unwrap();
+    let second = r#"<link name="other_tool0"/><joint name="to_other" type="fixed"><parent link="flange"/><child link="other_tool0"/></joint></robot>"#;
+    std::fs::write(at("cell.urdf"), urdf.replace("</robot>", second)).unwrap();
+    let convert = |to: &str| {
+        let paths = [at("run"), at(to), at("cell.urdf")].map(|p| p.display().to_string());
+        let args = ["convert", &paths[0], &paths[1], "--urdf", &paths[2]];
+        let output = Command::new(env!("CARGO_BIN_EXE_robotcal")).args(args).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    assert_eq!(convert("stated.mcap").0, Some(0));
+    let manifest = std::fs::read_to_string(at("run/series.toml")).unwrap();
+    std::fs::write(at("run/series.toml"), manifest.replace("tip = \"tool0\"\n", "")).unwrap();
+    let (code, said) = convert("open.mcap");
+    assert!(code == Some(2) && said.contains("tip_ambiguous"), "{said}");
+}

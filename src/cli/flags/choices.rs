@@ -55,7 +55,7 @@ pub enum Model {
     Gear,
     /// Also gravity and backlash
     Full,
-    /// The largest of these that no smaller one beats decisively (Laplace evidence, printed)
+    /// The largest of these that no smaller one beats decisively, by the data (Laplace evidence)
     Auto,
 }
 

@@ -98,8 +98,9 @@ pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &Bo
     let upright = sheet.paper.and_then(|name| Sheet::by_name(name, true));
     let sheet = upright.filter(|upright| !holds(&sheet) && holds(upright)).unwrap_or(sheet);
     if !holds(&sheet) {
-        let (width, height) = (width * 1e3, height * 1e3);
-        let what = format!("the board needs {width:.0} x {height:.0} mm");
+        let [width, height, margin] = [width, height, plate.pitch_m].map(|m| 1e3 * m);
+        let what =
+            format!("the board needs {width:.0} x {height:.0} mm with a white margin of {margin:.0} mm all round");
         return Err(Error::new(Code::PlateImpossible, "--sheet", what, "take a larger sheet or a smaller board"));
     }
     let name = name(args, &plate);

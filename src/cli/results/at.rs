@@ -31,6 +31,7 @@ const MOST_ROWS: usize = 20;
 /// The joint vectors of `--at`, rad or m.
 pub(super) struct AtTable<'a> {
     file: &'a Path,
+    unit: Unit,
     readings: Vec<Vec<f64>>,
 }
 
@@ -42,7 +43,7 @@ impl AtArgs {
     pub(super) fn table(&self, chain: &Chain) -> Result<Option<AtTable<'_>>> {
         let (Some(file), Some(unit)) = (&self.at, self.at_unit) else { return Ok(None) };
         let rows = joint_table::read(file, &[], chain, (unit, "--at-unit"))?;
-        Ok(Some(AtTable { file, readings: rows.into_iter().map(|(_, q)| q).collect() }))
+        Ok(Some(AtTable { file, unit, readings: rows.into_iter().map(|(_, q)| q).collect() }))
     }
 
     /// The same for a solution, whose chain is put together for it.
@@ -63,11 +64,11 @@ impl AtTable<'_> {
     /// # Errors
     /// A solution that does not tie robot and plate, a file that cannot be written.
     pub(super) fn run(&self, record: &SolutionRecord, folder: &Path) -> Result<String> {
-        let Self { file, readings } = self;
+        let Self { file, unit, readings } = self;
         let model = exported_model(record)?;
         let found = flange_at(&model, readings)?;
         let path = folder.join("at.csv");
-        let table = at_csv(&model, readings, &found);
+        let table = at_csv(&model, (*unit).into(), readings, &found);
         write_beside(folder, &[("at.csv".to_owned(), table.as_bytes())], &[file.to_path_buf()])?;
         let mut out = String::new();
         for (k, f) in found.iter().enumerate().take(MOST_ROWS) {
@@ -87,13 +88,17 @@ impl AtTable<'_> {
                 1e3 * rotation
             );
         }
+        if found.len() > MOST_ROWS {
+            let _ = writeln!(out, "at        and {} more", found.len() - MOST_ROWS);
+        }
         let still = relative_to(&model);
         let among = if still.starts_with("plate/") { record.placements.len() } else { record.mountings.len() };
         let _ = writeln!(
             out,
-            "at        {} joint vectors in {}, relative to {}{}; the robot is the corrected URDF with compensation.toml{}",
+            "at        {} joint vectors in {} (readings in {}), relative to {}{}; the robot is the corrected URDF with compensation.toml{}",
             found.len(),
             path.display(),
+            if *unit == Unit::Deg { "deg, m" } else { "rad, m" },
             still,
             if among > 1 { format!(" (of {among} that of the first image on the robot)") } else { String::new() },
             if entered_offsets(record)?.iter().any(|offset| *offset != 0.0) {

@@ -57,14 +57,11 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     flange(out, r)?;
     accuracy(out, r)?;
     let robot = &r.robot;
-    writeln!(
-        out,
-        "robot     {} ({} -> {}, {} moving joints)",
-        robot.name,
-        robot.base,
-        robot.tip,
-        robot.readings.len()
-    )?;
+    let moved = match r.has_no_robot() {
+        true => "poses of the controller".to_owned(),
+        false => format!("{} moving joints", robot.readings.len()),
+    };
+    writeln!(out, "robot     {} ({} -> {}, {moved})", robot.name, robot.base, robot.tip)?;
     if r.estimator != Estimator::Joint {
         writeln!(out, "estimator {}; by default the fit is joint", r.estimator.title())?;
     }
@@ -79,7 +76,7 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         }
         writeln!(
             out,
-            "series    {}: {} of {} images used, {observations} markers observed, {}x{} px",
+            "series    {}: {} of {} images used, {observations} observations, {}x{} px",
             one.name,
             used().count(),
             images().count(),
@@ -142,7 +139,6 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         "flange    expected error of its position relative to {} in the region of the stops, by model and covariance, RMS:",
         r.flange_is_relative_to()
     )?;
-    writeln!(out, "          nominal    {}   base and tool that fit it best", mm(e.nominal_m))?;
     let (alone_m, _) = e.best_urdf_m();
     if r.has_no_robot() {
         writeln!(
@@ -156,6 +152,7 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
             "          {scatter_mm:.3} mm of it is how these poses are off from stop to stop: errors of the controller's own model of the robot among them, which --urdf takes away"
         );
     }
+    writeln!(out, "          nominal    {}   base and tool that fit it best", mm(e.nominal_m))?;
     writeln!(out, "          calibrated {}   corrected URDF alone", mm(alone_m))?;
     if r.beyond_urdf() {
         if e.alone_m.is_some() {

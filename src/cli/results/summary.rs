@@ -103,11 +103,13 @@ fn flange(r: &SolutionRecord) -> Vec<String> {
     let told = if e.intervals.is_some() { " (95 % interval)" } else { "" };
     let i = e.intervals.as_ref();
     let (alone_m, of_alone) = e.best_urdf_m();
-    let mut lines = vec![
-        format!("accuracy  expected flange error in the joint ranges of the stops, RMS{told}:"),
-        row("nominal robot", e.nominal_m, i.map(|i| i.nominal_m)),
-        row(if r.has_no_robot() { "poses of the controller" } else { "corrected URDF alone" }, alone_m, of_alone),
-    ];
+    let mut lines = vec![format!("accuracy  expected flange error in the range of the stops, RMS{told}:")];
+    if r.has_no_robot() {
+        lines.push(row("poses of the controller", alone_m, of_alone));
+    } else {
+        lines.push(row("nominal robot", e.nominal_m, i.map(|i| i.nominal_m)));
+        lines.push(row("corrected URDF alone", alone_m, of_alone));
+    }
     if r.beyond_urdf() {
         lines.push(row("with compensation.toml", e.model_m, i.map(|i| i.model_m)));
     }
@@ -125,8 +127,11 @@ fn flange_in_brief(r: &SolutionRecord) -> Vec<String> {
     let Some(e) = &r.flange else { return Vec::new() };
     let whole =
         if r.beyond_urdf() { format!(", {:.3} with compensation.toml", 1e3 * e.model_m) } else { String::new() };
-    let words =
-        format!("not valid: flange {:.3} mm nominal, {:.3} URDF{whole}", 1e3 * e.nominal_m, 1e3 * e.best_urdf_m().0);
+    let (alone_mm, nominal_mm) = (1e3 * e.best_urdf_m().0, 1e3 * e.nominal_m);
+    let words = match r.has_no_robot() {
+        true => format!("not valid: flange {alone_mm:.3} mm by the poses of the controller"),
+        false => format!("not valid: flange {nominal_mm:.3} mm nominal, {alone_mm:.3} URDF{whole}"),
+    };
     vec![indented("accuracy", &words)]
 }
 
@@ -134,7 +139,8 @@ fn flange_in_brief(r: &SolutionRecord) -> Vec<String> {
 fn held_out(r: &SolutionRecord) -> Vec<String> {
     let [before, after] = [&r.accuracy.nominal, &r.accuracy.calibrated].map(|e| e.rms_mm);
     let what = if r.images.is_empty() { "at stops" } else { "on the plate, in images" };
-    let words = format!("{before:.3} -> {after:.3} mm {what} that the fit had not seen");
+    let change = if r.has_no_robot() { String::new() } else { format!("{before:.3} -> ") };
+    let words = format!("{change}{after:.3} mm {what} that the fit had not seen");
     vec![indented("held out", &words)]
 }
 
@@ -211,10 +217,10 @@ fn next(r: &SolutionRecord, verdict: &Verdict, most: usize) -> Vec<String> {
 }
 
 /// Where joint offsets are not in the corrected URDF.
-const ENTER_MASTERING: &str = "enter the offsets of mastering.csv that have in_urdf = no in the controller first, and no others: they are not in the URDF";
+const ENTER_MASTERING: &str = "enter in the controller the offsets of mastering.csv with in_urdf = no";
 
 /// Where its size stands in its file alone.
-const MEASURE_THE_PLATE: &str = "measure the plate (give [scale]): 0.1 % off its stated size is 1 mm a metre";
+const MEASURE_THE_PLATE: &str = "measure the plate ([scale]): 0.1 % off its stated size is 1 mm a metre";
 
 /// A stop to add, in a line.
 fn advice(r: &SolutionRecord, a: &Advice) -> String {
@@ -222,8 +228,15 @@ fn advice(r: &SolutionRecord, a: &Advice) -> String {
     let slides = reading.is_some_and(|k| r.robot.reading_kinds[k] == JointKind::Prismatic);
     let (factor, unit) = if slides { (1e3, "mm") } else { (1f64.to_degrees(), "deg") };
     let [near, low, high] = [a.near, a.covered.0, a.covered.1].map(|q| factor * q);
-    let gain = 100.0 * a.gain;
-    format!("stops with {} near {near:.0} {unit} (so far {low:.0} to {high:.0}): {gain:.0} % less unknown", a.joint)
+    let so_far = match a.gap.map(|(below, above)| (factor * below, factor * above)) {
+        Some((below, above)) => format!(" (none from {below:.0} to {above:.0})"),
+        None => format!(" (so far {low:.0} to {high:.0})"),
+    };
+    let line = |so_far: &str| {
+        format!("stops with {} near {near:.0} {unit}{so_far}: {:.0} % less unknown", a.joint, 100.0 * a.gain)
+    };
+    let whole = line(&so_far);
+    if indented("next", &whole).chars().count() > WIDTH { line("") } else { whole }
 }
 
 /// Where all of it stands.

@@ -6,12 +6,13 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::convert_camera::{self, Wanted};
+use crate::calibration::{Ends, Inputs};
 use crate::cli::Verdict;
 use crate::cli::flags::recording::RecordingArgs;
 use crate::cli::flags::robot::read_chain;
 use crate::cli::results::show::read_solution;
 use crate::cli::terminal::say::{say, say_line};
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::files::{folder_of, picture_size};
 use crate::model::robot::Robot;
 use crate::output::recording::{MAGNIFIED, overlay};
@@ -70,32 +71,32 @@ pub fn run(args: &ConvertArgs) -> Result<Verdict> {
         return Ok(Verdict::Good);
     }
     let is_recording = args.to.extension().is_some_and(|e| e == "mcap");
-    let new = (!is_recording).then(|| NewFolder::begin(&args.to)).transpose()?;
-    let chain = match &args.urdf {
-        Some(file) => Some(read_chain(file, args.base.as_deref(), args.tip.as_deref())?),
-        None => None,
-    };
-    let mut verdict = Verdict::Good;
-    match new {
-        None => verdict = to_recording(args, chain)?,
-        Some(new) => {
-            let options = args.recording.options(&[])?;
-            let options = chain.map_or(options.clone(), |chain| options.of_chain(&chain));
-            let extracted = convert_recording(&args.from, new.path(), &options)?;
-            new.finish()?;
-            say!("{}", text(&extracted));
-        }
-    }
+    let verdict = if is_recording { to_recording(args)? } else { to_series(args)? };
     say_line!("written   {}", args.to.display());
     Ok(verdict)
 }
 
+/// A recording as a series folder, with the joints of the robot where there is one.
+fn to_series(args: &ConvertArgs) -> Result<Verdict> {
+    let new = NewFolder::begin(&args.to)?;
+    let chain = match &args.urdf {
+        Some(file) => Some(read_chain(file, args.base.as_deref(), args.tip.as_deref())?),
+        None => None,
+    };
+    let options = args.recording.options(&[])?;
+    let options = chain.map_or(options.clone(), |chain| options.of_chain(&chain));
+    let extracted = convert_recording(&args.from, new.path(), &options)?;
+    new.finish()?;
+    say!("{}", text(&extracted));
+    Ok(Verdict::Good)
+}
+
 /// A series folder as a recording, with the nominal tip and the observations where there are any; not all of it where images cannot be decoded.
-fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<Verdict> {
+fn to_recording(args: &ConvertArgs) -> Result<Verdict> {
     series::require_new(&args.to)?;
     let folder = folder_of(&args.to);
     let _tried = ResultFolder::among(folder)?;
-    let Some(chain) = chain else {
+    let Some(urdf) = &args.urdf else {
         let what = "the joints of a series mean nothing without their robot";
         return Err(Error::new(
             Code::OptionMissing,
@@ -106,6 +107,8 @@ fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<Verdict> {
     };
     let series = series::read_images(&args.from)?;
     refuse_more_than_one(&series)?;
+    let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
+    let Inputs { chain, tip_notice, description, .. } = Inputs::with_series(urdf, vec![series.clone()], ends)?;
     let readings = series.readings_for(&chain)?;
     let names: Vec<&str> = series.stops.stops.iter().map(|s| s.image.as_str()).collect();
     let found = args.solution.as_deref().map(|path| overlay(&read_solution(path)?, &names, &readings)).transpose()?;
@@ -126,7 +129,9 @@ fn to_recording(args: &ConvertArgs, chain: Option<Chain>) -> Result<Verdict> {
     if found.is_some() {
         say_line!("overlay   green: used, orange: left out, red: residuals, {MAGNIFIED} times their length");
     }
-    for notice in series.notices.iter().chain(&series.reading_notices(&chain)).chain(&written.notices) {
+    let of_robot: Vec<Notice> = tip_notice.into_iter().chain(Notice::said_once(&description.notices)).collect();
+    let of_readings = series.reading_notices(&chain);
+    for notice in of_robot.iter().chain(&series.notices).chain(&of_readings).chain(&written.notices) {
         say_line!("note      {}", notice.coded());
     }
     for image in &written.unreadable {

@@ -95,9 +95,9 @@ pub struct PlanArgs {
     /// several times for several places [default: on the table before the robot; for a fixed camera 50 mm before the flange]
     #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true, help_heading = "Camera and plate")]
     plate_pose: Vec<String>,
-    /// Joint terms that shall be found; auto plans for all of them
-    #[arg(long, value_enum, default_value_t = Model::Rigid, help_heading = "Robot")]
-    robot_model: Model,
+    /// Joint terms that shall be found; auto plans for all of them [default: rigid; with --from those of the result]
+    #[arg(long, value_enum, help_heading = "Robot")]
+    robot_model: Option<Model>,
     /// Accuracy is meant at these joint vectors (ten or more; columns as in joints.csv, degrees and m), not over the workspace
     #[arg(long, value_name = "FILE", conflicts_with_all = ["d_optimal", "parameters"], help_heading = "What is to be accurate")]
     targets: Option<PathBuf>,
@@ -403,7 +403,7 @@ fn demand(args: &PlanArgs, chain: &Chain) -> Result<Demand> {
 }
 
 fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)> {
-    let model: RobotModel = args.robot_model.into();
+    let asked: Option<RobotModel> = args.robot_model.map(Into::into);
     if let Some(path) = &args.from {
         let record = read_solution(path)?;
         if entered_offsets(&record)?.iter().any(|offset| *offset != 0.0) {
@@ -411,6 +411,7 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)>
                 "readings  the joint values are those of the controller before the offsets of mastering.csv were entered, as those of the images before"
             );
         }
+        let model = asked.unwrap_or_else(|| plan_start::model_of(&record, &chain));
         let (mut setting, taken) = plan_start::from_solution(&record, chain, model)?;
         for (k, text) in args.plate_pose.iter().enumerate() {
             setting.placements.push((format!("new_{k}"), pose_or_file("--plate-pose", text)?));
@@ -422,7 +423,7 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)>
         .as_ref()
         .ok_or_else(|| Error::new(Code::OptionMissing, "--plate", "is missing", "give plate.toml"))?;
     let plate = read_plate(plate, &mut Vec::new())?;
-    let robot = model.robot(chain);
+    let robot = asked.unwrap_or(RobotModel::Rigid).robot(chain);
     let mount: CameraMount = args.mount.into();
     let mounting = match (&args.hand_camera, mount) {
         (Some(text), _) => pose_or_file("--hand-camera", text)?,
@@ -484,7 +485,9 @@ fn summary(
     let mut text = format!(
         "plan      {} images of {} candidates, {} of them searched near the best ({} views tried)\n\
          certified {:.1} % of the best weights, {:.1} % after rounding\n\
-         flange    {:.3} mm before, {:.3} mm expected (RMS over {} joint vectors)\n",
+         flange    {:.3} mm before, {:.3} mm expected (RMS over {} joint vectors, with\n\
+         {:10}base frame and a point of the flange fitted, as frames by touches\n\
+         {:10}do; identify states it relative to the plate, which is more)\n",
         plan.legs.len(),
         plan.pool.len(),
         plan.pool.len() - plan.drawn,
@@ -494,6 +497,8 @@ fn summary(
         1e3 * forecast.before_m,
         1e3 * forecast.flange_m,
         plan.targets.len(),
+        "",
+        ""
     );
     for point in &forecast.curve {
         text += &format!(

@@ -1,5 +1,6 @@
 //! What a plan starts from: camera.yaml, pose files, solution.json.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use nalgebra::{Matrix2, Vector2, Vector6};
@@ -81,6 +82,15 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
         joint_sigma: camera.joint_noise.clone(),
     };
     Ok((setting, stops))
+}
+
+/// The smallest robot model that has all joint terms of a solution.
+pub fn model_of(record: &SolutionRecord, chain: &Chain) -> RobotModel {
+    let has_all = |model: &RobotModel| {
+        let names: BTreeSet<String> = model.robot(chain.clone()).terms.iter().map(|t| t.term.name()).collect();
+        record.robot.terms.iter().all(|t| names.contains(&t.term))
+    };
+    [RobotModel::Rigid, RobotModel::Gear].into_iter().find(has_all).unwrap_or(RobotModel::Full)
 }
 
 /// The robot with the twists and terms of the solution; terms of the model that it has not stand at zero.

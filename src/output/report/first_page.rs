@@ -15,7 +15,8 @@ pub(super) fn first_page(r: &SolutionRecord) -> Markup {
     html! {
         h1 { "Calibration of " (r.robot.name) }
         p.sub {
-            (r.robot.base) " to " (r.robot.tip) ", " (count(r.robot.readings.len(), "moving joint")) "; "
+            (r.robot.base) " to " (r.robot.tip) ", "
+            @if r.has_no_robot() { "poses of the controller; " } @else { (count(r.robot.readings.len(), "moving joint")) "; " }
             @if !r.images.is_empty() {
                 (images_used(&r.statistics))
             }
@@ -68,10 +69,11 @@ fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
     let Some(e) = &r.flange else { return html! {} };
     let i = e.intervals.as_ref();
     let (alone_m, of_alone) = e.best_urdf_m();
-    let mut rows = vec![
-        ("Nominal robot", e.nominal_m, i.map(|i| i.nominal_m), "before"),
-        (if r.has_no_robot() { "Poses of the controller" } else { "Corrected URDF alone" }, alone_m, of_alone, "after"),
-    ];
+    let alone = if r.has_no_robot() { "Poses of the controller" } else { "Corrected URDF alone" };
+    let mut rows = vec![(alone, alone_m, of_alone, "after")];
+    if !r.has_no_robot() {
+        rows.insert(0, ("Nominal robot", e.nominal_m, i.map(|i| i.nominal_m), "before"));
+    }
     if r.beyond_urdf() {
         rows.push(("Corrected URDF with compensation.toml", e.model_m, i.map(|i| i.model_m), "after"));
     }
@@ -89,8 +91,8 @@ fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
             } } }
         } }
         p.note {
-            "Position of the flange relative to " (r.flange_is_relative_to()) " in the region of the stops, by model and covariance; the nominal robot with the base and "
-            "the tool that fit it best. " (significant(1e3 * e.scatter_m))
+            "Position of the flange relative to " (r.flange_is_relative_to()) " in the region of the stops, by model and covariance"
+            @if !r.has_no_robot() { "; the nominal robot with the base and the tool that fit it best" } ". " (significant(1e3 * e.scatter_m))
             @if r.has_no_robot() {
                 " mm of it is how the poses of the controller are off from stop to stop: errors of its own model of the robot among them, which a run with "
                 code { "--urdf" } " takes away. "
@@ -107,21 +109,27 @@ fn held_out(r: &SolutionRecord) -> Markup {
     let (before, after) = (&r.accuracy.nominal, &r.accuracy.calibrated);
     if r.images.is_empty() {
         return html! { p {
-            "Measured at stops that the fit had not seen: " b { (significant(before.rms_mm)) " → " (significant(after.rms_mm)) " mm" }
+            "Measured at stops that the fit had not seen: " b { @if !r.has_no_robot() { (significant(before.rms_mm)) " → " } (significant(after.rms_mm)) " mm" }
             ", worst " (significant(after.worst_mm)) " mm (" a href="#accuracy" { "more" } ")."
         } };
     }
     html! { p {
-        "Measured on images that the fit had not seen: " b { (significant(before.rms_mm)) " → " (significant(after.rms_mm)) " mm" }
+        "Measured on images that the fit had not seen: " b { @if !r.has_no_robot() { (significant(before.rms_mm)) " → " } (significant(after.rms_mm)) " mm" }
         " on the plate, worst image " (significant(after.worst_mm)) " mm. They all look at one plate: this is no figure for the workspace ("
         a href="#accuracy" { "more" } ")."
     } }
 }
 
+/// With the full stop that it lacks; a question has its mark.
+pub(super) fn sentence(words: &str) -> String {
+    let end = if words.ends_with(['?', '.', '!']) { "" } else { "." };
+    format!("{words}{end}")
+}
+
 /// Remedies of a failed result; else what to install, and what would help most.
 fn steps(r: &SolutionRecord, v: &Verdict) -> Vec<Markup> {
     if v.trust == Trust::Failed {
-        let remedies = v.remedies.iter().map(|remedy| html! { (remedy) "." });
+        let remedies = v.remedies.iter().map(|remedy| html! { (sentence(remedy)) });
         return remedies.chain([html! { "Identify again; keep the earlier robot model until then." }]).collect();
     }
     let mut all = Vec::new();

@@ -45,13 +45,17 @@ pub fn figure_files(record: &SolutionRecord) -> Vec<FigureFile> {
 /// All chapters; those without content are left out.
 fn chapters(r: &SolutionRecord, pictures: &Thumbnails) -> Vec<Chapter> {
     let seen = r.photogrammetry();
+    let [scene, noise] = match r.has_no_robot() {
+        true => ["Camera poses and plate", "Noise of the poses of the controller"],
+        false => ["Arm, camera poses and plate", "Joint noise"],
+    };
     let ended = format!("; the last solve {} after {} in all", r.status, count(r.iterations, "step"));
     vec![
         Chapter::new("accuracy", "Accuracy before and after", sections::accuracy(r)),
         Chapter::new("findings", "Findings, and what to do", findings::section(&Verdict::of(r), &r.notices)),
         Chapter::new("left-out", "What was read, and what was left out", sections::left_out(r)),
         Chapter::new("pictures", "Pictures: best, worst and left out", gallery::gallery(seen, pictures)),
-        Chapter::new("scene", "Arm, camera poses and plate", scene::section(r)),
+        Chapter::new("scene", scene, scene::section(r)),
         Chapter::new("coverage", "What the stops covered", coverage::section(r)),
         Chapter::new("bodies", "Trackers and contacts", bodies::section(r)),
         Chapter::new("images", "Residuals by image", images::table(r)),
@@ -62,7 +66,7 @@ fn chapters(r: &SolutionRecord, pictures: &Thumbnails) -> Vec<Chapter> {
         Chapter::new("undetermined", "What the data could not determine", parameters::undetermined(r)),
         Chapter::new("known", "What the data tell, and what to measure next", knowledge::identifiable(r)),
         Chapter::new("two-step", "Two-step calibration", two_stage::section(r)),
-        Chapter::new("joint-noise", "Joint noise", sections::joint_noise(r)),
+        Chapter::new("joint-noise", noise, sections::joint_noise(r)),
         Chapter::new("poses", "Hand-eye transform and target pose", parameters::placed(r)),
         Chapter::new("cameras", "Camera", parameters::cameras(seen)),
         Chapter::new("plate", "Plate", sections::plates(seen)),

@@ -46,7 +46,7 @@ fn numbers(plan: &Plan, forecast: &Forecast) -> Markup {
     let worst = plan.imbalance.iter().copied().fold(0.0, f64::max);
     html! {
         div class="big" {
-            div { b { (format!("{:.3} mm", 1e3 * forecast.flange_m)) } span { "expected error of the flange (RMS)" } }
+            div { b { (format!("{:.3} mm", 1e3 * forecast.flange_m)) } span { "expected error of the flange (RMS), base frame and a point of the flange fitted" } }
             div { b { (format!("{:.3} mm", 1e3 * forecast.before_m)) } span { "before" } }
             div { b { (format!("{:.1} %", 1e2 * plan.efficiency[1])) } span { "certified share of what any choice could reach" } }
             div { b { (format!("{:.0} %", 1e2 * worst)) } span { "largest one-sidedness of the approach of a joint" } }
@@ -83,6 +83,9 @@ fn gains(forecast: &Forecast, taken: usize) -> Markup {
         p class="note" {
             @if taken > 0 { "By itself, on top of the " (taken) " images that were taken already." }
             @else { "On top of all other planned images." }
+            @if forecast.gains.len() > PARAMETERS {
+                " The " (PARAMETERS) " of " (forecast.gains.len()) " images that help most."
+            }
         }
         div class="wide" { table {
             tr { th { "Image" } th class="n" { "Flange, mm" } th class="n" { "better by, µm" } th { "Helps most with" } th class="n" { "its sigma before" } th class="n" { "after" } }

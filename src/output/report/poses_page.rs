@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::chapters::{coverage, findings, gallery, images, parameters, pose_residuals, sections};
 use super::figures::scene;
 use super::figures::thumbnails::Thumbnails;
-use super::first_page::{images_used, judged};
+use super::first_page::{images_used, judged, sentence};
 use super::page::frame::{Chapter, SCRIPT, STYLE, page_of_chapters};
 use super::wording::many;
 use super::wording::words::{count, fixed, significant};
@@ -108,7 +108,7 @@ fn scales(r: &PosesRecord) -> impl Iterator<Item = (String, ScaleRecord)> {
 /// Remedies of a failed result; else what to use, and what is missing.
 fn steps(r: &PosesRecord, verdict: &Verdict) -> Vec<Markup> {
     if verdict.trust == Trust::Failed {
-        let remedies = verdict.remedies.iter().map(|remedy| html! { (remedy) "." });
+        let remedies = verdict.remedies.iter().map(|remedy| html! { (sentence(remedy)) });
         return remedies.chain([html! { "Adjust again; do not use these poses until then." }]).collect();
     }
     let files = |start: &'static str, end: &'static str| {

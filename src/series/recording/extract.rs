@@ -103,6 +103,8 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let groups = groups(&mut scan, &postures, &times, options, (open, told.sigma_s())).map_err(|error| {
         let error = or_set_back(error, &scan.notices);
         let never_still = error.code == Code::RobotNeverStill;
+        let others = if never_still { others_move(&error.place, &postures, &joints, options) } else { None };
+        let error = others.unwrap_or(error);
         // Degrees are as many times too fast as radians.
         seems_degrees
             .as_ref()
@@ -452,6 +454,27 @@ fn no_stop(place: &str, postures: &[Posture], [standstills, short]: [usize; 2], 
     Error::new(Code::RobotNeverStill, place, what, remedy)
 }
 
+/// Why there is no stop where some joints never stand, and the others do: joints of another robot, where none are asked for.
+fn others_move(place: &str, postures: &[Posture], joints: &[String], options: &RecordingOptions) -> Option<Error> {
+    if !options.joints.is_empty() {
+        return None;
+    }
+    let stops_of = |chosen: &[usize]| {
+        let of = |p: &Posture| Posture { positions: chosen.iter().map(|&k| p.positions[k]).collect(), ..p.clone() };
+        let own: Vec<Posture> = postures.iter().map(of).collect();
+        standstills(&own, options.still_speed, nanoseconds(options.least_still_s)).len()
+    };
+    let (standing, moving): (Vec<usize>, Vec<usize>) = (0..joints.len()).partition(|&k| stops_of(&[k]) > 0);
+    let stops = if standing.is_empty() { 0 } else { stops_of(&standing) };
+    if stops == 0 || moving.is_empty() {
+        return None;
+    }
+    let named: Vec<&str> = moving.iter().map(|&k| joints[k].as_str()).collect();
+    let what = format!("{} never stand still; the other joints do {stops} times", named.join(", "));
+    let remedy = "where they are those of another robot, take the joints of the URDF: --urdf robot.urdf with identify or convert (detect and poses take the series folder that convert makes)";
+    Some(Error::new(Code::RobotNeverStill, place, what, remedy))
+}
+
 fn shrunk(standstill: Standstill) -> Standstill {
     let Standstill { from_ns, to_ns } = standstill;
     if to_ns - from_ns < 8 * MARGIN_NS {
@@ -482,6 +505,24 @@ mod tests {
         }
         let times = postures.iter().step_by(5).map(|p| p.time_ns).collect();
         (postures, times)
+    }
+
+    #[test]
+    fn joints_of_another_robot_that_never_stand_are_named_unless_joints_are_asked_for() {
+        let (mut postures, _) = recorded(&[(100, false), (80, true), (100, false), (80, true), (100, false)]);
+        for (k, posture) in postures.iter_mut().enumerate() {
+            posture.positions.push(0.3 * (0.01 * k as f64).sin());
+        }
+        let joints = ["left/joint_1", "right/joint_1"].map(String::from);
+        let options = RecordingOptions::default();
+        let error = others_move("run", &postures, &joints, &options).unwrap();
+        assert_eq!(error.code, Code::RobotNeverStill);
+        assert!(error.what.contains("right/joint_1") && !error.what.contains("left"), "{error}");
+        assert!(error.what.contains("3 times") && error.remedy.contains("--urdf"), "{error}");
+        let asked = RecordingOptions { joints: joints.to_vec(), ..options.clone() };
+        assert_eq!(others_move("run", &postures, &joints, &asked), None);
+        postures.iter_mut().for_each(|p| p.positions = vec![p.positions[1]]);
+        assert_eq!(others_move("run", &postures, &joints[1..], &options), None);
     }
 
     #[test]

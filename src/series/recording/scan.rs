@@ -282,6 +282,11 @@ impl Scan {
                 let said = format!("topic {asked} has no {what}; its topics are: {}", all());
                 Err(Error::new(Code::TopicMissing, place(), said, format!("name another {flag}")))
             }
+            (None, []) if self.topics.is_empty() && self.damage().is_some() => {
+                let damage = self.damage().unwrap_or_default();
+                let remedy = "copy it again; where the original is no better, record again";
+                Err(Error::new(Code::RecordingDamaged, place(), format!("no message can be read: {damage}"), remedy))
+            }
             (None, []) => {
                 let damage: String = self.notices.iter().map(|n| format!(" ({})", n.what)).collect();
                 let said = format!("has no {what}{damage}; its topics are: {}", all());
@@ -292,6 +297,11 @@ impl Scan {
                 Err(Error::new(Code::TopicAmbiguous, place(), said, format!("name one with {flag}")))
             }
         }
+    }
+
+    /// What is said of damage, where there is some.
+    fn damage(&self) -> Option<&str> {
+        self.notices.iter().find(|n| n.code == Code::RecordingDamaged).map(|n| n.what.as_str())
     }
 
     /// What is wanted is there, in an encoding that is not read.

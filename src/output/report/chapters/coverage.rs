@@ -22,6 +22,9 @@ const SEEN_EVERYWHERE: &str = "Markers should have been seen everywhere in the i
 
 /// Both.
 pub(in crate::output::report) fn section(r: &SolutionRecord) -> Markup {
+    if r.has_no_robot() {
+        return of_images(r.photogrammetry());
+    }
     html! {
         p {
             "Each dot is the reading of a joint at a stop, within the limits of the joint. What no stop covered is extrapolated. "
@@ -43,7 +46,7 @@ pub(in crate::output::report) fn of_images(p: Photogrammetry) -> Markup {
 fn fields(p: Photogrammetry) -> Markup {
     html! {
         div.pair { @for k in 0..p.cameras.len() { @if let Some(svg) = field(p, k) {
-            (pointed(&svg, &format!("Markers in use over the image of camera {}; darker: more of them.", p.cameras[k].name)))
+            (pointed(&svg, &format!("Observations in use over the image of camera {}; darker: more of them.", p.cameras[k].name)))
         } } }
     }
 }
@@ -121,13 +124,13 @@ fn field(r: Photogrammetry, camera: usize) -> Option<String> {
     let most = counts.iter().copied().max().filter(|most| *most > 0)? as f64;
     let height = 420.0 * size[1] / size[0];
     let step = [420.0 / COLUMNS as f64, height / rows as f64];
-    let mut svg = Svg::new(420.0, height, &format!("Markers over the image of camera {}", c.name));
+    let mut svg = Svg::new(420.0, height, &format!("Observations over the image of camera {}", c.name));
     svg.rect([0.0; 2], [420.0, height], "frame");
     for (k, n) in counts.iter().enumerate() {
         let at = [(k % COLUMNS) as f64 * step[0], (k / COLUMNS) as f64 * step[1]];
         let class =
             ["h0", "h1", "h2", "h3", "h4"][if *n == 0 { 0 } else { 1 + ((3.99 * *n as f64 / most) as usize).min(3) }];
-        svg.titled(&format!("{n} markers"), |svg| svg.rect(at, step, class));
+        svg.titled(&format!("{n} observations"), |svg| svg.rect(at, step, class));
     }
     Some(svg.finish())
 }

@@ -22,7 +22,7 @@ pub(in crate::output::report) fn gallery(r: Photogrammetry, pictures: &Thumbnail
     let of = |kind: Shown| shown(r).into_iter().filter(move |(_, k)| *k == kind).map(|(k, _)| k).collect::<Vec<_>>();
     html! {
         p.note {
-            "Green: markers in use. Orange: left out. Red: residuals, " (count(magnified as usize, "time")) " their length. "
+            "Green: observations in use. Orange: left out. Red: residuals, " (count(magnified as usize, "time")) " their length. "
             "A good image is sharp, shows the plate large, and its residuals point in all directions."
         }
         @for (title, kind) in [("Smallest residuals", Shown::Best), ("Largest residuals", Shown::Worst), ("Left out", Shown::LeftOut)] {
@@ -47,7 +47,7 @@ fn one(r: Photogrammetry, k: usize, picture: &Thumbnail, magnified: f64) -> Mark
     let several = r.series.len() > 1;
     let words = match (&image.reason, image.rms_px) {
         (Some(reason), _) => reason.clone(),
-        (None, Some(px)) => format!("{} px RMS, {}", fixed(px, 3), count(used(image), "marker")),
+        (None, Some(px)) => format!("{} px RMS, {}", fixed(px, 3), count(used(image), "observation")),
         (None, None) => String::new(),
     };
     html! {
@@ -82,7 +82,7 @@ fn drawing(image: &ImageRecord, picture: &Thumbnail, magnified: f64) -> String {
     let in_use = image.is_used();
     let (used, out) = (dots(&|k| in_use && o.reason[k].is_none()), dots(&|k| !in_use || o.reason[k].is_some()));
     let lines = if in_use { lines } else { String::new() };
-    let label = escaped(&format!("Image {} with the markers that were found", image.name));
+    let label = escaped(&format!("Image {} with the observations", image.name));
     let uri = data_uri(&picture.jpeg);
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{label}\" viewBox=\"0 0 {w} {h}\">\

@@ -21,13 +21,13 @@ pub(in crate::output::report) fn table(r: &SolutionRecord) -> Markup {
     html! {
         (bars(r.photogrammetry(), "Point at a bar, or touch it: image, pose, joints, residual."))
         p.note {
-            "Markers: used of those found. Residual: RMS per point in the joint fit. Held out: how far the robot model misses the "
+            "Observations: used of those found. Residual: RMS per point in the joint fit. Held out: how far the robot model misses the "
             "plate in an image that it had not seen, nominal and calibrated."
             (not_listed(r.photogrammetry(), listed.len()))
         }
         div.wide.long { table {
             thead { tr {
-                th { "Image" } th.n { "markers" } th.n { "residual, px" } th.n { "nominal, mm" } th.n { "calibrated, mm" } th { "left out because" }
+                th { "Image" } th.n { "observations" } th.n { "residual, px" } th.n { "nominal, mm" } th.n { "calibrated, mm" } th { "left out because" }
             } }
             tbody { (rows(&r.images, &listed, 6, |_, i| row(i))) }
         } }
@@ -43,14 +43,14 @@ pub(in crate::output::report) fn of_poses(r: &PosesRecord) -> Markup {
     html! {
         (bars(r.photogrammetry(), "Point at a bar, or touch it: image, pose, residual."))
         p.note {
-            "Markers: used of those found. Residual: RMS per point. Position and direction: one sigma of the camera in the frame of the plate, per axis. "
+            "Observations: used of those found. Residual: RMS per point. Position and direction: one sigma of the camera in the frame of the plate, per axis. "
             "Semi-axes: of the ellipsoid of one sigma, of the camera, and of the plate's centre as the camera sees it. Errors of position and direction go "
             "together (correlation: the largest), so that what the camera measures of the plate is known better than where it stands."
             (not_listed(r.photogrammetry(), listed.len()))
         }
         div.wide.long { table {
             thead { tr {
-                th { "Image" } th.n { "markers" } th.n { "residual, px" } th.n { "position, mm" } th.n { "direction, arcmin" }
+                th { "Image" } th.n { "observations" } th.n { "residual, px" } th.n { "position, mm" } th.n { "direction, arcmin" }
                 th.n { "semi-axes, mm:" br; "camera" } th.n { "semi-axes, mm:" br; "plate's centre" } th.n { "correlation" } th { "left out because" }
             } }
             tbody { (rows(&r.images, &listed, 9, |k, i| pose_row(i, known[k]))) }
@@ -89,7 +89,7 @@ fn rows(
     } }
 }
 
-/// Name, markers in use of those found, residual.
+/// Name, observations in use of those found, residual.
 fn contributed(i: &ImageRecord) -> Markup {
     let found = i.observations.reason.len();
     let used = match i.reason {

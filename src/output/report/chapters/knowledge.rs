@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::assess::{Cause, UnknownDirection};
+use crate::assess::{Cause, Identifiability, UnknownDirection};
 use crate::linalg::median;
 use crate::output::parameter_words::direction;
 use crate::output::report::figures::maps;
@@ -17,6 +17,31 @@ const MOST_PAIRS: usize = 20;
 /// Rank, directions that stay unknown, observability indices, what to measure next.
 pub(in crate::output::report) fn identifiable(r: &SolutionRecord) -> Markup {
     let Some(found) = &r.identifiability else { return html! {} };
+    html! {
+        @if !r.has_no_robot() { (of_robot(r, found)) }
+        (correlated(found))
+        @if let Some(o) = found.observability {
+            h3 { "Observability" }
+            p.note { "Over the directions that the data tell, in units of the priors; larger is better. For comparing series of the same robot." }
+            div.wide { table {
+                thead { tr { th.n { "O1" } th.n { "O2" } th.n { "O3" } th.n { "O4" } th.n { "O5" } } }
+                tbody { tr { @for v in [o.o1, o.o2, o.o3, o.o4, o.o5] { td.n { (format!("{v:.3e}")) } } } }
+            } }
+        }
+        @if !r.evidences.is_empty() {
+            h3 { "Which robot model the data support" }
+            div.wide { table {
+                thead { tr { th { "Model" } th.n { "log evidence, relative" } th.n { "parameters" } } }
+                tbody { @for e in &r.evidences { tr {
+                    td { (e.model.name()) } td.n { (format!("{:.1}", e.log_evidence)) } td.n { (e.parameters) }
+                } } }
+            } }
+        }
+    }
+}
+
+/// What the data tell of the robot.
+fn of_robot(r: &SolutionRecord, found: &Identifiability) -> Markup {
     let of = |causes: &'static [Cause]| found.unknown.iter().filter(move |d| causes.contains(&d.cause));
     html! {
         p {
@@ -42,6 +67,12 @@ pub(in crate::output::report) fn identifiable(r: &SolutionRecord) -> Markup {
             (group("Parameters that do the same to this robot", of(&[Cause::Redundant])))
             (group("Parameters that do nothing to this robot", of(&[Cause::Idle])))
         }
+    }
+}
+
+/// Pairs that are hard to tell apart.
+fn correlated(found: &Identifiability) -> Markup {
+    html! {
         @if !found.correlations.is_empty() {
             h3 { "Correlated parameters" }
             p.note {
@@ -52,23 +83,6 @@ pub(in crate::output::report) fn identifiable(r: &SolutionRecord) -> Markup {
                 (c.first) " and " (c.second) " (" (format!("{:.3}", c.correlation)) "): " span.note { (c.remedy) }
             } } }
             @if found.correlations.len() > MOST_PAIRS { p.note { "and " (found.correlations.len() - MOST_PAIRS) " weaker pairs." } }
-        }
-        @if let Some(o) = found.observability {
-            h3 { "Observability" }
-            p.note { "Over the directions that the data tell, in units of the priors; larger is better. For comparing series of the same robot." }
-            div.wide { table {
-                thead { tr { th.n { "O1" } th.n { "O2" } th.n { "O3" } th.n { "O4" } th.n { "O5" } } }
-                tbody { tr { @for v in [o.o1, o.o2, o.o3, o.o4, o.o5] { td.n { (format!("{v:.3e}")) } } } }
-            } }
-        }
-        @if !r.evidences.is_empty() {
-            h3 { "Which robot model the data support" }
-            div.wide { table {
-                thead { tr { th { "Model" } th.n { "log evidence, relative" } th.n { "parameters" } } }
-                tbody { @for e in &r.evidences { tr {
-                    td { (e.model.name()) } td.n { (format!("{:.1}", e.log_evidence)) } td.n { (e.parameters) }
-                } } }
-            } }
         }
     }
 }

@@ -16,8 +16,11 @@ use crate::series::CameraMount;
 /// Most corrections in the list of the strongest.
 const MOST_CORRECTIONS: usize = 12;
 
-/// Corrections of the robot.
+/// Corrections of the robot; nothing where poses of the controller are all that is known of it.
 pub(in crate::output::report) fn robot(r: &SolutionRecord) -> Markup {
+    if r.has_no_robot() {
+        return html! {};
+    }
     let strongest = strongest(r);
     html! {
         h3 { "The corrections that are surest to be real" }
@@ -150,7 +153,9 @@ pub(in crate::output::report) fn undetermined(r: &SolutionRecord) -> Markup {
     let others = || r.estimates.iter().filter(|e| e.free && !e.name.starts_with("robot/"));
     let silent: Vec<&str> = others().filter(|e| r.hardly_determines(e)).map(|e| e.name.as_str()).collect();
     html! {
-        @if weak.is_empty() {
+        @if r.has_no_robot() {
+            p { "Nothing is identified of the robot: its poses are taken as the controller gives them." }
+        } @else if weak.is_empty() {
             p { "Nothing: the data say something about every parameter of the robot." }
         } @else {
             p {

@@ -13,15 +13,19 @@ use crate::output::solution_json::SolutionRecord;
 /// Before and after on held-out images.
 pub(in crate::output::report) fn accuracy(r: &SolutionRecord) -> Markup {
     let are_images = !r.images.is_empty();
-    let rows = [("Nominal robot", &r.accuracy.nominal), ("Calibrated robot", &r.accuracy.calibrated)];
+    let rows = match r.has_no_robot() {
+        true => vec![("Poses of the controller", &r.accuracy.calibrated)],
+        false => vec![("Nominal robot", &r.accuracy.nominal), ("Calibrated robot", &r.accuracy.calibrated)],
+    };
+    let readings = if r.has_no_robot() { "poses of the controller" } else { "joint readings" };
     html! {
         @if !are_images {
             p {
-                "How well do the joint readings alone say where the body on the tip was measured? The stops were put aside in " (r.accuracy.folds)
+                "How well do the " (readings) " alone say where the body on the tip was measured? The stops were put aside in " (r.accuracy.folds)
                 " groups in turn; a model fitted to the other groups had to predict them. The error includes how well the robot repeats."
             }
         } @else { p {
-            "How well do the joint readings alone say where the plate appears? The images were put aside in "
+            "How well do the " (readings) " alone say where the plate appears? The images were put aside in "
             (r.accuracy.folds) " groups in turn; a model fitted to the other groups had to predict them. "
             "The images look at one plate: this is no figure for the whole workspace, and smaller than what the robot is off elsewhere. "
             "In millimetres it is the distance between where the image shows the markers and where the robot model puts them; "
@@ -36,7 +40,7 @@ pub(in crate::output::report) fn accuracy(r: &SolutionRecord) -> Markup {
                 td.n { (significant(e.worst_mm)) } td.n { (e.images) }
             } } }
         } }
-        @if let Some(svg) = plots::histogram(r) {
+        @if let Some(svg) = plots::histogram(r).filter(|_| !r.has_no_robot()) {
             figure {
                 (PreEscaped(svg))
                 figcaption { span.key.before {} "nominal robot   " span.key.after {} "calibrated robot" }
@@ -64,7 +68,7 @@ pub(in crate::output::report) fn images_left_out(r: Photogrammetry) -> Markup {
     let rejected: Vec<_> = r.images.iter().filter_map(|i| i.reason.as_ref().map(|reason| (&i.name, reason))).collect();
     html! {
         div.wide { table {
-            thead { tr { th { "Series" } th { "camera" } th.n { "images" } th.n { "used" } @if r.robot.is_some() { th.n { "on the robot" } } th.n { "markers observed" } } }
+            thead { tr { th { "Series" } th { "camera" } th.n { "images" } th.n { "used" } @if r.robot.is_some() { th.n { "on the robot" } } th.n { "observations" } } }
             tbody { @for name in &series { (series_row(r, name)) } }
         } }
         @if rejected.is_empty() {
@@ -86,23 +90,30 @@ pub(in crate::output::report) fn images_left_out(r: Photogrammetry) -> Markup {
 fn series_row(r: Photogrammetry, name: &str) -> Markup {
     let images = || r.images.iter().filter(|i| i.series == name);
     let used = || images().filter(|i| i.is_used());
-    let markers: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
+    let observations: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
     let camera = images().next().and_then(|i| r.cameras.get(i.camera)).map_or("", |c| &c.name);
     html! { tr {
         td.name { (name) } td { (camera) } td.n { (images().count()) } td.n { (used().count()) }
-        @if r.robot.is_some() { td.n { (images().filter(|i| i.is_on_robot()).count()) } } td.n { (markers) }
+        @if r.robot.is_some() { td.n { (images().filter(|i| i.is_on_robot()).count()) } } td.n { (observations) }
     } }
 }
 
 /// How well each joint repeats its reading.
 pub(in crate::output::report) fn joint_noise(r: &SolutionRecord) -> Markup {
+    let poses = r.has_no_robot();
+    let caption = match poses {
+        true => "Each bar is one axis of the poses; the second number is the effect on a tool 1 m from it.",
+        false => "Each bar is one joint; the second number is the effect on a tool 1 m from the axis.",
+    };
     html! {
-        p {
+        @if poses {
+            p { "How far the poses of the controller are typically off (one sigma), as the " (data(r)) " show it: errors of its own model of the robot among them." }
+        } @else { p {
             "How far a joint typically stands from where its reading and the model say (one sigma), as the " (data(r)) " show it. "
             "No model can remove this part: it bounds the accuracy of a single move."
-        }
+        } }
         @match plots::joint_noise(r) {
-            Some(svg) => (figure(&svg, "Each bar is one joint; the second number is the effect on a tool 1 m from the axis.")),
+            Some(svg) => (figure(&svg, caption)),
             None => p { "The readings were taken as exact." },
         }
     }

@@ -62,7 +62,9 @@ impl Scene {
                 CameraMount::Hand => (*flange * x, z),
                 CameraMount::Fixed => (x, *flange * z),
             };
-            scene.arms.push((k, arm(&robot, &links)));
+            if !r.has_no_robot() {
+                scene.arms.push((k, arm(&robot, &links)));
+            }
             scene.cameras.push((k, camera));
             let stands = image.camera_mount == CameraMount::Hand;
             if !(stands && placed.contains(&image.placement)) {
@@ -73,7 +75,7 @@ impl Scene {
         let covered: Vec<_> = r.workspace.iter().filter(|w| w.covered).map(|w| Vector3::from(w.xyz_m)).collect();
         let step = covered.len().div_ceil(MOST_PLACES).max(1);
         scene.places = covered.into_iter().step_by(step).collect();
-        (!scene.arms.is_empty()).then_some(scene)
+        (!scene.cameras.is_empty()).then_some(scene)
     }
 
     /// A plate with the images of it whose pose is known.
@@ -185,11 +187,15 @@ struct Words<'a> {
 /// The chapter of a robot.
 pub(in crate::output::report) fn section(r: &SolutionRecord) -> Markup {
     let Some(scene) = Scene::of(r) else { return html! {} };
-    let label = format!("Arm, {} camera poses, plate and region of the stops", scene.cameras.len());
+    let [arm, the_arm, postures] = match r.has_no_robot() {
+        true => ["", "The view", ""],
+        false => ["Arm, ", "The arm at one stop, the view", ", with the arm in many postures"],
+    };
+    let label = format!("{arm}{} camera poses, plate and region of the stops", scene.cameras.len());
     html! {
         p {
-            "The arm at one stop, the view of the camera at every stop (red: left out), the plate (green), and the region in which the "
-            "accuracy is stated (grey). Good series look at the plate from all sides, from near and far, with the arm in many postures."
+            (the_arm) " of the camera at every stop (red: left out), the plate (green), and the region in which the "
+            "accuracy is stated (grey). Good series look at the plate from all sides, from near and far" (postures) "."
         }
         (scene.drawn(r.photogrammetry(), &Words { label: &label, frame: "base frame", slider: "stop" }))
     }
