@@ -306,7 +306,7 @@ fn a_cut_or_damaged_file_gives_what_stands_before_the_damage() {
     // Nothing at all before the damage.
     fs::write(&path, &whole[..40]).unwrap();
     let message = refusal(&path, &three());
-    assert_says(&message, Code::TopicMissing, &["cut.mcap"]);
+    assert_says(&message, Code::RecordingDamaged, &["cut.mcap"]);
 }
 
 /// Three wrong bytes in one chunk: its own messages are lost, those of the chunks behind it are not.
