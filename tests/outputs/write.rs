@@ -536,8 +536,8 @@ fn a_result_of_another_robot_or_series_is_not_replaced_unasked() {
     let ur = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf").display().to_string();
     let kr = kr6_urdf().display().to_string();
     let series = [(&kr, "z1/run1"), (&ur, "z2/run1"), (&kr, "z3/run1")];
-    for (urdf, folder) in series {
-        let flags = ["--observations", "--images", "24", "--errors", "rigid"];
+    for ((urdf, folder), seed) in series.into_iter().zip(["1", "2", "3"]) {
+        let flags = ["--observations", "--images", "24", "--errors", "rigid", "--seed", seed];
         let (code, said) =
             robotcal(root.path(), &[&["simulate", "--urdf", urdf, "--out", folder], &flags[..]].concat());
         assert_eq!(code, Some(0), "{said}");
@@ -554,7 +554,8 @@ fn a_result_of_another_robot_or_series_is_not_replaced_unasked() {
         assert!(code == Some(2) && said.starts_with("error[output_exists]: "), "{said}");
         assert!(result() == first);
     }
-    for same in ["z1/run1", "./z1/run1"] {
+    fs::rename(root.path().join("z1"), root.path().join("moved")).unwrap();
+    for same in ["moved/run1", "./moved/run1"] {
         let (code, said) = identify((&kr, same));
         assert_ne!(code, Some(2), "{said}");
     }
