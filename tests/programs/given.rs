@@ -204,6 +204,14 @@ fn programs_and_records_of_the_user_are_not_replaced() {
     good();
     // Of another cell.
     refused(&[&folder.join("p2/a.src")], "out", "a.src");
+    // An earlier version said nothing of copies, and kept no record.
+    let findings = std::fs::read_to_string(folder.join("out/findings.json")).unwrap();
+    let rows: Vec<&str> = findings.lines().filter(|row| !row.contains(Code::ProgramCopied.name())).collect();
+    write("out/findings.json", &rows.join("\n").replace("},\n]", "}\n]"));
+    write("out/a.dat", without);
+    std::fs::remove_file(folder.join("out/.robotcal-written.json")).unwrap();
+    good();
+    assert_eq!(std::fs::read_to_string(folder.join("out/a.dat.kept-1")).unwrap(), without);
     // Touched up by hand.
     let corrected = std::fs::read_to_string(folder.join("out/a.src")).unwrap();
     write("out/a.src", &format!("{corrected}; by hand\n"));
