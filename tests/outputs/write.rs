@@ -23,8 +23,11 @@ fn result(names: &[&str], content: &str) -> Files {
     files
 }
 
+/// What was written to a folder, by hash.
+const WRITTEN: &str = ".robotcal-written.json";
+
 fn found(folder: &Path) -> Files {
-    let entries = fs::read_dir(folder).unwrap().map(|e| e.unwrap());
+    let entries = fs::read_dir(folder).unwrap().map(|e| e.unwrap()).filter(|e| e.file_name() != WRITTEN);
     entries.map(|e| (e.file_name().into_string().unwrap(), fs::read(e.path()).unwrap_or_default())).collect()
 }
 
@@ -66,6 +69,24 @@ fn an_earlier_result_is_replaced_as_a_whole_and_other_files_stay() {
     assert_eq!(fs::read(out.join("pictures/a.png")).unwrap(), b"picture");
     assert_eq!(found(&out)["solution.json"], new["solution.json"]);
     assert_eq!(names(root.path()), ["out"]);
+}
+
+#[test]
+fn a_result_that_was_changed_is_left_alone() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    write_all(&out, &result(&["camera.yaml"], "old")).unwrap();
+    write_all(&out, &result(&["camera.yaml"], "new")).unwrap();
+    fs::write(out.join("camera.yaml"), "new, and by hand").unwrap();
+    let before = found(&out);
+    assert_eq!(write_all(&out, &result(&["camera.yaml"], "newer")).unwrap_err().code, Code::OutputForeign);
+    assert_eq!(found(&out), before);
+    // The record of a folder that was emptied is nobody's.
+    for name in before.keys() {
+        fs::remove_file(out.join(name)).unwrap();
+    }
+    write_all(&out, &plan("planned")).unwrap();
+    assert_eq!(all_below(&out), plan("planned"));
 }
 
 #[test]
@@ -127,6 +148,24 @@ fn a_plate_that_was_measured_is_not_drawn_over() {
     fs::write(&file, &measured).unwrap();
     assert_eq!([draw("coded-circles"), draw("chessboard")], [Some(2), Some(2)]);
     assert_eq!(fs::read_to_string(&file).unwrap(), measured);
+}
+
+#[test]
+fn a_plate_is_drawn_again_at_another_resolution() {
+    let root = tempfile::tempdir().unwrap();
+    for kind in [&["coded-circles"][..], &["chessboard", "--shape", "8x6", "--pitch-mm", "25"]] {
+        let draw =
+            |dpi: &str| robotcal(root.path(), &[&["plate", "--out", kind[0], "--dpi", dpi, "--kind"], kind].concat());
+        for dpi in ["50", "60"] {
+            let (code, said) = draw(dpi);
+            assert_eq!(code, Some(0), "{kind:?}: {said}");
+        }
+        let png = root.path().join(kind[0]).join("plate.png");
+        fs::write(&png, "of the user").unwrap();
+        let (code, said) = draw("70");
+        assert!(code == Some(2) && said.starts_with("error[output_exists]: "), "{said}");
+        assert_eq!(fs::read(&png).unwrap(), b"of the user");
+    }
 }
 
 #[test]
@@ -472,6 +511,63 @@ fn files_among_others_come_together() {
     assert_eq!(all_below(&out), expected.map(|(n, c)| (n.to_owned(), c.into())).into());
 }
 
+/// Whatever their names and endings are.
+#[test]
+fn files_among_others_are_known_by_what_was_written() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("reports");
+    let write = |content: &str| {
+        let files = ["rep", "r.htm", "R.HTML", "p.png", "a.csv"].map(|name| (name.to_owned(), content.as_bytes()));
+        write_beside(&out, &files, &[])
+    };
+    ["first", "second"].iter().for_each(|content| write(content).unwrap());
+    fs::write(out.join("p.png"), "second, and by hand").unwrap();
+    let before = all_below(&out);
+    assert_eq!(write("third").unwrap_err().code, Code::OutputExists);
+    assert_eq!(all_below(&out), before);
+    fs::remove_file(out.join("p.png")).unwrap();
+    write("third").unwrap();
+    assert!(all_below(&out).values().all(|bytes| bytes == b"third"));
+}
+
+/// Of earlier versions, or moved there.
+#[test]
+fn files_that_no_record_names_are_kept_under_another_name() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("reports");
+    let table = |content: &str| format!("j1,x_m,y_m,z_m,qx,qy,qz,qw,sigma_mm,sigma_mrad,outside\n{content}\n");
+    let write = |content: &str| write_beside(&out, &[("at.csv".to_owned(), table(content).as_bytes())], &[]);
+    write("first").unwrap();
+    fs::remove_file(out.join(WRITTEN)).unwrap();
+    fs::write(out.join("at.csv"), table("by hand")).unwrap();
+    ["second", "third"].iter().for_each(|content| write(content).unwrap());
+    let expected = [("at.csv", "third"), ("at.csv.kept-1", "by hand")];
+    assert_eq!(all_below(&out), expected.map(|(n, c)| (n.to_owned(), table(c).into_bytes())).into());
+}
+
+#[test]
+fn files_among_others_that_came_in_part_are_completed_before_the_next() {
+    let root = tempfile::tempdir().unwrap();
+    let [out, other] = ["out", "other"].map(|name| root.path().join(name));
+    fn files(content: &str) -> [(String, &[u8]); 2] {
+        ["a", "b"].map(|n| (n.to_owned(), content.as_bytes()))
+    }
+    write_beside(&out, &files("first"), &[]).unwrap();
+    write_beside(&other, &files("second"), &[]).unwrap();
+    // One of them has come, the other and the record have not.
+    fs::copy(other.join("a"), out.join("a")).unwrap();
+    let unfinished = out.join(".robotcal-unfinished");
+    fs::create_dir_all(unfinished.join("files")).unwrap();
+    for name in ["b", WRITTEN] {
+        fs::copy(other.join(name), unfinished.join("files").join(name)).unwrap();
+    }
+    let list = format!("{{\"move_in\": [\"a\", \"b\", \"{WRITTEN}\"], \"remove\": []}}");
+    fs::write(unfinished.join("commit.json"), list).unwrap();
+    assert!(ResultFolder::among(&out).unwrap().for_files(&["a", "b"]).is_ok());
+    write_beside(&out, &files("third"), &[]).unwrap();
+    assert_eq!(all_below(&out), files("third").map(|(n, bytes)| (n, bytes.to_vec())).into());
+}
+
 /// An earlier result of the command is replaced, whatever is not of the program stays.
 #[test]
 fn files_of_the_user_are_not_replaced() {
@@ -480,12 +576,13 @@ fn files_of_the_user_are_not_replaced() {
     let joints = "joint_a1,joint_a2,joint_a3,joint_a4,joint_a5,joint_a6\n10,-80,90,20,40,10\n";
     fs::write(root.path().join("at_joints.csv"), joints).unwrap();
     let at = ["show", &solution, "--at", "at_joints.csv", "--at-unit", "deg", "--out", "at"];
-    for (args, made) in [
-        (&["show", &solution, "--report", "own/r.html"][..], "own/r.html"),
-        (&["show", &solution, "--figures", "figures"], "figures"),
-        (&at, "at/at.csv"),
-        (&["frames", "--from", &solution, "--plate", "--out", "frames"], "frames/frames.json"),
-        (&["frames", "--from", &solution, "--plate", "--out", "frames"], "frames/robotcal_frames.src"),
+    let frames = ["frames", "--from", &solution, "--plate", "--out", "frames"];
+    for (args, made, option) in [
+        (&["show", &solution, "--report", "own/r.html"][..], "own/r.html", "--report"),
+        (&["show", &solution, "--figures", "figures"], "figures", "--figures"),
+        (&at, "at/at.csv", "--out"),
+        (&frames, "frames/frames.json", "--out"),
+        (&frames, "frames/robotcal_frames.src", "--out"),
     ] {
         for _ in 0..2 {
             let (code, said) = robotcal(root.path(), args);
@@ -493,16 +590,19 @@ fn files_of_the_user_are_not_replaced() {
         }
         let mut made = root.path().join(made);
         if made.is_dir() {
-            let first = fs::read_dir(&made).unwrap().next().unwrap().unwrap();
-            made = first.path();
+            made = made.join(&names(&made)[0]);
         }
         let written = fs::read(&made).unwrap();
-        let users = [b"of the user, by hand\n", &written[written.len() / 2..]].concat();
-        fs::write(&made, &users).unwrap();
-        let (code, said) = robotcal(root.path(), args);
-        assert_eq!(code, Some(2), "{args:?}: {said}");
-        assert!(said.starts_with("error[output_exists]: "), "{args:?}: {said}");
-        assert!(fs::read(&made).unwrap() == users, "{args:?}");
+        let of_user = [b"of the user, by hand\n", &written[written.len() / 2..]].concat();
+        let edited = [&written, &b" "[..]].concat();
+        for users in [of_user, edited] {
+            fs::write(&made, &users).unwrap();
+            let (code, said) = robotcal(root.path(), args);
+            assert_eq!(code, Some(2), "{args:?}: {said}");
+            // words: the name of the option.
+            assert!(said.starts_with("error[output_exists]: ") && said.contains(option), "{args:?}: {said}");
+            assert!(fs::read(&made).unwrap() == users, "{args:?}");
+        }
         fs::write(&made, &written).unwrap();
         assert_ne!(robotcal(root.path(), args).0, Some(2), "{args:?}");
     }
@@ -536,8 +636,8 @@ fn a_result_of_another_robot_or_series_is_not_replaced_unasked() {
     let ur = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf").display().to_string();
     let kr = kr6_urdf().display().to_string();
     let series = [(&kr, "z1/run1"), (&ur, "z2/run1"), (&kr, "z3/run1")];
-    for (urdf, folder) in series {
-        let flags = ["--observations", "--images", "24", "--errors", "rigid"];
+    for ((urdf, folder), seed) in series.into_iter().zip(["1", "2", "3"]) {
+        let flags = ["--observations", "--images", "24", "--errors", "rigid", "--seed", seed];
         let (code, said) =
             robotcal(root.path(), &[&["simulate", "--urdf", urdf, "--out", folder], &flags[..]].concat());
         assert_eq!(code, Some(0), "{said}");
@@ -554,7 +654,8 @@ fn a_result_of_another_robot_or_series_is_not_replaced_unasked() {
         assert!(code == Some(2) && said.starts_with("error[output_exists]: "), "{said}");
         assert!(result() == first);
     }
-    for same in ["z1/run1", "./z1/run1"] {
+    fs::rename(root.path().join("z1"), root.path().join("moved")).unwrap();
+    for same in ["moved/run1", "./moved/run1"] {
         let (code, said) = identify((&kr, same));
         assert_ne!(code, Some(2), "{said}");
     }

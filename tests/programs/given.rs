@@ -140,6 +140,36 @@ fn compensate_into(cell: &Cell, files: &[&Path], out: &Path) -> Run {
     Run { output: command.output().unwrap(), out: out.to_path_buf(), programs: Vec::new() }
 }
 
+/// Of a program that is not corrected again, its gate stays.
+#[test]
+fn findings_of_other_programs_in_the_folder_stay() {
+    let mut cell = Cell::kuka(128);
+    let [whole, other] = [0, 1].map(|_| one_target(&mut cell));
+    let looped = "LOOP\nPTP P\nP={A1 1,A2 -80,A3 90,A4 20,A5 40,A6 10}\nENDLOOP\nEND";
+    let part = other.replace("END", looped).replace("PTP {", "DECL E6AXIS P\nP={").replace("a()", "b()");
+    let files = [("a.src", &whole), ("b.src", &part)].map(|(name, text)| cell.write(name, text.as_bytes()));
+    cell.compensate(&[&files[1]], &["--unordered"]).expect(1);
+    let out = cell.folder.path().join("out");
+    let left = || {
+        let text = std::fs::read(out.join("findings.json")).unwrap();
+        let all: Vec<serde_json::Value> = serde_json::from_slice(&text).unwrap();
+        let is_left = |f: &&serde_json::Value| f["code"] == Code::TargetsLeft.name();
+        all.iter()
+            .filter(is_left)
+            .map(|f| (f["programs"].clone(), f["quantities"]["targets"].clone()))
+            .collect::<Vec<_>>()
+    };
+    let of_b = vec![(serde_json::json!(["b.src"]), serde_json::json!(1.0))];
+    assert_eq!(left(), of_b);
+    for _ in 0..2 {
+        cell.compensate(&[&files[0]], &["--unordered"]).expect(0);
+        assert_eq!(left(), of_b);
+    }
+    cell.write("b.src", whole.replace("a()", "b()").as_bytes());
+    cell.compensate(&[&files[1]], &["--unordered"]).expect(0);
+    assert_eq!(left(), []);
+}
+
 #[test]
 fn programs_and_records_of_the_user_are_not_replaced() {
     let mut cell = Cell::kuka(127);
@@ -174,6 +204,14 @@ fn programs_and_records_of_the_user_are_not_replaced() {
     good();
     // Of another cell.
     refused(&[&folder.join("p2/a.src")], "out", "a.src");
+    // An earlier version said nothing of copies, and kept no record.
+    let findings = std::fs::read_to_string(folder.join("out/findings.json")).unwrap();
+    let rows: Vec<&str> = findings.lines().filter(|row| !row.contains(Code::ProgramCopied.name())).collect();
+    write("out/findings.json", &rows.join("\n").replace("},\n]", "}\n]"));
+    write("out/a.dat", without);
+    std::fs::remove_file(folder.join("out/.robotcal-written.json")).unwrap();
+    good();
+    assert_eq!(std::fs::read_to_string(folder.join("out/a.dat.kept-1")).unwrap(), without);
     // Touched up by hand.
     let corrected = std::fs::read_to_string(folder.join("out/a.src")).unwrap();
     write("out/a.src", &format!("{corrected}; by hand\n"));

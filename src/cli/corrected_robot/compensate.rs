@@ -19,7 +19,7 @@ use crate::geom::Pose;
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
 use crate::output::corrections::{self, FileFinding, Meant, TABLE};
-use crate::output::written_programs::{OfOthers, WrittenProgram, require_same_source, seen_from};
+use crate::output::written_programs::{OfOthers, RunFinding, WrittenProgram, require_same_source, seen_from};
 use crate::output::{ResultFolder, compensated};
 use crate::programs::compensate::Compensated;
 use crate::programs::{
@@ -282,13 +282,15 @@ fn write(
         written.push((name, bytes));
     }
     let names: Vec<&str> = written.iter().map(|(name, _)| name.as_str()).collect();
-    let OfOthers { programs: mut records, corrections } = OfOthers::read(place.path(), &names, report);
+    let OfOthers { programs: mut records, findings: of_others, corrections } =
+        OfOthers::read(place.path(), &names, report);
     for ((path, file), (name, bytes)) in args.programs.iter().zip(&program.files).zip(&written) {
         let made_of = seen_from(place.path(), path);
         require_same_source(place.path(), name, &made_of)?;
         records.push(WrittenProgram::new((name, bytes), &file.bytes, made_of));
     }
-    let said = corrections::findings_json(findings, &records)?;
+    let findings = [RunFinding::all(findings, &names), of_others].concat();
+    let said = corrections::findings_json(&findings, &records)?;
     let report = format!("{report}{corrections}");
     written.push((corrections::TABLE.to_owned(), report.as_bytes()));
     written.push((corrections::FINDINGS.to_owned(), said.as_bytes()));
@@ -327,7 +329,7 @@ fn program_findings(
         .chain(corrections::nominal_findings(program, done))
         .chain(corrections::displaced_finding(program, done))
         .chain(corrections::expected_findings(expected, done, meant, &subject))
-        .chain(corrections::left_finding(left, &subject))
+        .chain(corrections::left_finding(left.iter().map(|l| l.why.reason.name()), &subject))
         .chain(corrections::missing_finding(program, left, &subject))
         .collect()
 }

@@ -110,9 +110,6 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     findings.extend(mirrored.map(|joints| mirror_image_fits(&joints, &subject)));
     findings.extend(from_below(robot.exported(), (&fitted, &touches), &found.limits, &subject));
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
-    let mut beside = frame_files::files(&frames);
-    let urdf = corrected_urdf(&record, &found, &in_the_base(&frames, &record, &fitted))?;
-    beside.insert(format!("{}.frames.urdf", folder_name(std::slice::from_ref(&record.robot.name))), urdf.into_bytes());
     let made = FramesRecord {
         format: FORMAT,
         version: env!("CARGO_PKG_VERSION").into(),
@@ -145,9 +142,10 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
             learned: fitted.knowledge.learned.as_slice().to_vec(),
             taken: fitted.knowledge.taken.as_slice().to_vec(),
         },
-        as_written: frames_record::hashes(&beside),
     };
-    let mut files = beside;
+    let mut files = frame_files::files(&frames);
+    let urdf = corrected_urdf(&record, &found, &in_the_base(&frames, &record, &fitted))?;
+    files.insert(format!("{}.frames.urdf", folder_name(std::slice::from_ref(&record.robot.name))), urdf.into_bytes());
     files.insert(FILE_NAME.into(), frames_record::to_bytes(&made)?);
     let listed: Vec<(String, &[u8])> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
     place.write_beside(&listed, std::slice::from_ref(&args.from))?;

@@ -28,6 +28,9 @@ pub(super) struct AtArgs {
 /// Most rows that are printed.
 const MOST_ROWS: usize = 20;
 
+/// File of the predictions.
+pub(super) const AT: &str = "at.csv";
+
 /// The joint vectors of `--at`, rad or m.
 pub(super) struct AtTable<'a> {
     file: &'a Path,
@@ -67,9 +70,9 @@ impl AtTable<'_> {
         let Self { file, unit, readings } = self;
         let model = exported_model(record)?;
         let found = flange_at(&model, readings)?;
-        let path = folder.join("at.csv");
+        let path = folder.join(AT);
         let table = at_csv(&model, (*unit).into(), readings, &found);
-        write_beside(folder, &[("at.csv".to_owned(), table.as_bytes())], &[file.to_path_buf()])?;
+        write_beside(folder, &[(AT.to_owned(), table.as_bytes())], &[file.to_path_buf()])?;
         let mut out = String::new();
         for (k, f) in found.iter().enumerate().take(MOST_ROWS) {
             let [position, rotation] = f.sigmas();

@@ -1,11 +1,12 @@
 //! `robotcal identify`: series in, corrected robot out.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Deserialize;
 
-use super::at::{AtArgs, AtTable};
+use super::at::{AT, AtArgs, AtTable};
 use super::show::{read_solution, read_solution_with_bytes};
 use super::{long_table, summary};
 use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
@@ -133,9 +134,7 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
             };
             if place.is_none() && !args.dry_run {
                 let names: Vec<String> = inputs.series.iter().map(|s| s.name.clone()).collect();
-                let folder = Path::new("reports").join(folder_name(&names));
-                place = Some(claim(&folder)?);
-                require_same_series(&folder, &inputs.chain.robot, &args.series)?;
+                place = Some(claim(&Path::new("reports").join(folder_name(&names)))?);
             }
             if !args.dry_run {
                 at = args.at.table(&inputs.chain)?;
@@ -146,6 +145,9 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
                 say!("{}", long_table::of_stops(&dry_run(inputs.chain, &inputs.series, &options)?));
                 return Ok(Verdict::Good);
             }
+            if let (Some(unnamed), None) = (&place, &args.out) {
+                require_same_series(unnamed.path(), &args.series, &inputs)?;
+            }
             inputs.observe(&options.limits, &progress::of_series())?
         }
     };
@@ -155,6 +157,10 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let place = place.ok_or_else(|| {
         Error::new(Code::OptionMissing, "identify", "no folder for the results is given", "give --out")
     })?;
+    let place = match at.is_some() {
+        true => place.for_files(&[AT])?,
+        false => place,
+    };
     let estimator = args.two_stage.map_or(options.estimator, Into::into);
     let of_cameras = args.cameras.apply(&mut observed.series)?;
     observed.notices.extend(of_cameras);
@@ -165,8 +171,9 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
     write(args, calibration, place, at.as_ref())
 }
 
-/// Refuses to replace, in a folder that nobody named, the result of another robot or of series of the same names elsewhere.
-fn require_same_series(folder: &Path, robot: &str, series: &[PathBuf]) -> Result<()> {
+/// Refuses to replace, in a folder that nobody named, the result of another robot or of other series of the same names. A series is the same where it
+/// stands where it stood, or where its files have the hashes that are recorded.
+fn require_same_series(folder: &Path, given: &[PathBuf], inputs: &Inputs) -> Result<()> {
     #[derive(Deserialize)]
     struct Earlier {
         robot: Robot,
@@ -178,15 +185,23 @@ fn require_same_series(folder: &Path, robot: &str, series: &[PathBuf]) -> Result
     }
     let bytes = std::fs::read(folder.join(FILE_NAME)).unwrap_or_default();
     let Ok(earlier) = serde_json::from_slice::<Earlier>(&bytes) else { return Ok(()) };
-    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
-    let read: Vec<PathBuf> = earlier.inputs.iter().map(|file| real(&file.path)).collect();
-    let is_new = |path: &&PathBuf| !read.iter().any(|file| file.starts_with(real(path)));
-    let what = match series.iter().find(is_new) {
-        _ if earlier.robot.name != robot => format!("holds the result of another robot, {}", earlier.robot.name),
-        Some(other) => format!("holds the result of other series than {}", other.display()),
-        None => return Ok(()),
+    let refused = |what: String| {
+        Err(Error::new(Code::OutputExists, folder.display(), what, "name a folder for this result with --out"))
     };
-    Err(Error::new(Code::OutputExists, folder.display(), what, "name a folder for this result with --out"))
+    if earlier.robot.name != inputs.chain.robot {
+        return refused(format!("holds the result of another robot, {}", earlier.robot.name));
+    }
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    let paths: Vec<PathBuf> = earlier.inputs.iter().map(|file| real(&file.path)).collect();
+    let hashes: BTreeSet<&str> = earlier.inputs.iter().map(|file| file.sha256.as_str()).collect();
+    for (path, s) in given.iter().zip(&inputs.series) {
+        let stands_there = paths.iter().any(|file| file.starts_with(real(path)));
+        let is_known = |file: &InputFile| hashes.contains(file.sha256.as_str());
+        if !stands_there && !(s.inputs.iter().all(is_known) && s.image_hashes()?.iter().all(is_known)) {
+            return refused(format!("holds the result of other series than {}", path.display()));
+        }
+    }
+    Ok(())
 }
 
 fn write(

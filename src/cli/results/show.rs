@@ -14,7 +14,7 @@ use crate::files::{self, FileKind};
 use crate::output::difference::{Difference, compare_solutions};
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::output::verdict;
-use crate::output::{REPORT, Thumbnails, figure_files, recover, report_html, write_beside};
+use crate::output::{REPORT, ResultFolder, Thumbnails, figure_files, recover, report_html};
 use crate::urdf::JointKind;
 
 /// Flags of `show`.
@@ -73,12 +73,13 @@ pub fn run(args: &ShowArgs) -> Result<Verdict> {
         let page = report_html(&first, &Thumbnails::of_files(first.photogrammetry()));
         let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let folder = files::folder_of(file);
-        write_beside(folder, &[(name, page.as_bytes())], &args.solutions)?;
+        let place = ResultFolder::among(folder)?.named_by("--report");
+        place.write_beside(&[(name, page.as_bytes())], &args.solutions)?;
     }
     if let Some(folder) = &args.figures {
         let all = figure_files(&first);
         let files: Vec<(String, &[u8])> = all.iter().map(|f| (f.name.clone(), f.svg.as_bytes())).collect();
-        write_beside(folder, &files, &args.solutions)?;
+        ResultFolder::among(folder)?.named_by("--figures").write_beside(&files, &args.solutions)?;
     }
     if args.json {
         say!("{}", String::from_utf8_lossy(&solution_json::to_bytes(&first)?));

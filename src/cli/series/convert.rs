@@ -65,7 +65,6 @@ pub fn run(args: &ConvertArgs) -> Result<Verdict> {
         nearest: args.nearest,
     };
     if let Some(format) = convert_camera::format(&camera)? {
-        series::require_new(&args.to)?;
         convert_camera::run(&camera, format)?;
         say_line!("written   {}", args.to.display());
         return Ok(Verdict::Good);

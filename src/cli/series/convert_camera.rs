@@ -9,11 +9,11 @@ use crate::cli::terminal::say::say_line;
 use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind, folder_of};
 use crate::model::camera::{Camera, Lens};
+use crate::output::ResultFolder;
 use crate::output::camera_formats::{
     CameraFormat, OtherLens, camera_text, is_camera_file, loss_words, read_camera_file,
 };
 use crate::output::restore::{self, depths_of_record};
-use crate::output::write_beside;
 
 /// Depths of a camera of which no image is known, m: they matter to a lens that sees the distance alone.
 const UNKNOWN_DEPTHS_M: [f64; 2] = [1.0, 1.0];
@@ -86,7 +86,8 @@ pub(super) fn run(wanted: &Wanted, format: CameraFormat) -> Result<()> {
     let written = camera_text(format, (&name, &camera), &depths_m, other)?;
     let name_of_file = wanted.to.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let folder = folder_of(wanted.to);
-    write_beside(folder, &[(name_of_file, written.text.as_bytes())], &[wanted.from.to_path_buf()])?;
+    let place = ResultFolder::among(folder)?.named_by("TO");
+    place.write_beside(&[(name_of_file, written.text.as_bytes())], &[wanted.from.to_path_buf()])?;
     say_line!("camera    {name}: {}, written for {}", camera.lens.name(), format.name());
     if let Some(loss_px) = written.loss_px {
         say_line!("loss      {}: the nearest model of {}", loss_words(loss_px), format.name());

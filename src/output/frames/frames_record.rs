@@ -3,9 +3,6 @@
 //! Poses are `parent_from_frame`; covariances of points stand along the axes of the parent, those of poses are of body twists, translation
 //! first, row by row; m and rad. A change of meaning raises [`FORMAT`].
 
-use std::collections::BTreeMap;
-use std::path::Path;
-
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -165,25 +162,6 @@ pub struct FramesRecord {
     pub findings: Vec<FileFinding>,
     /// What goes on to targets.
     pub knowledge: KnowledgeRecord,
-    /// SHA-256 of the files beside it as they were written, lower-case hexadecimal; absent in files of earlier versions.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub as_written: BTreeMap<String, String>,
-}
-
-/// Hash of every file.
-pub fn hashes(files: &BTreeMap<String, Vec<u8>>) -> BTreeMap<String, String> {
-    let hash = |(name, bytes): (&String, &Vec<u8>)| (name.clone(), InputFile::of_bytes(Path::new(name), bytes).sha256);
-    files.iter().map(hash).collect()
-}
-
-/// The hashes in the bytes of a frames.json; none where it is no such file, or of an earlier version.
-pub fn recorded(bytes: &[u8]) -> BTreeMap<String, String> {
-    #[derive(Deserialize)]
-    struct Listed {
-        #[serde(default)]
-        as_written: BTreeMap<String, String>,
-    }
-    serde_json::from_slice::<Listed>(bytes).map_or_else(|_| BTreeMap::new(), |listed| listed.as_written)
 }
 
 /// Rows of a matrix.

@@ -104,13 +104,18 @@ pub fn displaced_finding(program: &Program, done: &Compensated) -> Option<FileFi
     })
 }
 
-/// Targets that stay as they are: how many, and how many for each reason.
-pub fn left_finding(left: &[Left], subject: &str) -> Option<FileFinding> {
-    let mut quantities = numbers([("targets", left.len() as f64)]);
-    left.iter().for_each(|l| *quantities.entry(l.why.reason.name().to_owned()).or_default() += 1.0);
-    let text = format!("{} targets stay as they are, each with its reason in {TABLE}", left.len());
+/// Targets that stay as they are, by the names of their reasons: how many, and how many for each.
+pub fn left_finding<'a>(reasons: impl Iterator<Item = &'a str>, subject: &str) -> Option<FileFinding> {
+    let mut quantities = numbers([("targets", 0.0)]);
+    for reason in reasons {
+        for counted in ["targets", reason] {
+            *quantities.entry(counted.to_owned()).or_default() += 1.0;
+        }
+    }
+    let targets = quantities["targets"];
+    let text = format!("{targets} targets stay as they are, each with its reason in {TABLE}");
     let (code, weight, subject) = (Code::TargetsLeft, Weight::Gate, subject.to_owned());
-    (!left.is_empty()).then_some(FileFinding { code, weight, subject, quantities, text })
+    (targets > 0.0).then_some(FileFinding { code, weight, subject, quantities, text })
 }
 
 /// No target at all: the text is not of that language, or it moves nothing.
@@ -266,7 +271,7 @@ pub fn expected_findings(
 ///
 /// # Errors
 /// None in practice: every field can be written as JSON.
-pub fn findings_json(findings: &[FileFinding], written: &[impl Serialize]) -> Result<String> {
+pub fn findings_json(findings: &[impl Serialize], written: &[impl Serialize]) -> Result<String> {
     let lines: Vec<String> = findings.iter().map(line).chain(written.iter().map(line)).collect::<Result<_>>()?;
     Ok(format!("[\n{}\n]\n", lines.join(",\n")))
 }

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::corrections::{FINDINGS, FileFinding, TABLE};
+use super::corrections::{FINDINGS, FileFinding, TABLE, left_finding};
 use crate::diagnose::Weight;
 use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind};
@@ -52,11 +53,33 @@ impl WrittenProgram {
     }
 }
 
-/// The files that the record of a folder says were written.
-fn listed(folder: &Path) -> Vec<WrittenProgram> {
+/// A finding of a run, with the names of the files that were corrected in it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunFinding {
+    #[serde(flatten)]
+    finding: FileFinding,
+    /// Absent in files of earlier versions.
+    programs: Vec<String>,
+}
+
+impl RunFinding {
+    /// Findings of the run that wrote these files.
+    pub fn all(findings: &[FileFinding], programs: &[&str]) -> Vec<Self> {
+        let programs: Vec<String> = programs.iter().map(|&name| name.to_owned()).collect();
+        findings.iter().map(|f| Self { finding: f.clone(), programs: programs.clone() }).collect()
+    }
+}
+
+/// What the record of a folder has of one kind.
+fn recorded_as<T: DeserializeOwned>(folder: &Path) -> Vec<T> {
     let text = files::read_text(&folder.join(FINDINGS), FileKind::Table).unwrap_or_default();
     let all: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap_or_default();
     all.into_iter().filter_map(|value| serde_json::from_value(value).ok()).collect()
+}
+
+/// The files that the record of a folder says were written.
+fn listed(folder: &Path) -> Vec<WrittenProgram> {
+    recorded_as(folder)
 }
 
 /// Hash of the bytes with which a file of a folder was written, by the record there.
@@ -94,8 +117,10 @@ pub fn require_same_source(folder: &Path, name: &str, made_of: &str) -> Result<(
 /// What the records of a folder say of programs that other runs wrote and that are still there.
 #[derive(Debug)]
 pub struct OfOthers {
-    /// Rows of findings.json.
+    /// Rows of findings.json that name the files.
     pub programs: Vec<WrittenProgram>,
+    /// What was found in those runs; how many targets stay as they are is counted for each file.
+    pub findings: Vec<RunFinding>,
     /// Rows of corrections.csv, with the columns of the new one.
     pub corrections: String,
 }
@@ -108,8 +133,32 @@ impl OfOthers {
         let programs = programs.into_iter().filter(|w| is_other(&w.finding.subject)).collect();
         let there = files::read_text(&folder.join(TABLE), FileKind::Table).unwrap_or_default();
         let header = table.lines().next().unwrap_or_default();
-        Self { programs, corrections: rows(&there, header, is_other).unwrap_or_default() }
+        let corrections = rows(&there, header, is_other).unwrap_or_default();
+        let mut findings: Vec<RunFinding> = recorded_as(folder);
+        findings.retain(|f| f.finding.code != Code::TargetsLeft);
+        findings.iter_mut().for_each(|f| f.programs.retain(|name| is_other(name)));
+        findings.retain(|f| !f.programs.is_empty());
+        findings.extend(left(&format!("{header}\n{corrections}")));
+        Self { programs, findings, corrections }
     }
+}
+
+/// Targets of a table of corrections that stay as they are, by file.
+fn left(table: &str) -> Vec<RunFinding> {
+    let mut reader = csv::Reader::from_reader(table.as_bytes());
+    let reason = reader.headers().ok().and_then(|names| names.iter().position(|name| name == "reason"));
+    let mut files: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for row in reader.records().filter_map(std::result::Result::ok) {
+        let reason = reason.and_then(|at| row.get(at)).filter(|reason| !reason.is_empty());
+        if let (Some(file), Some(reason)) = (row.get(0).map(Path::new).and_then(Path::file_name), reason) {
+            files.entry(file.to_string_lossy().into_owned()).or_default().push(reason.to_owned());
+        }
+    }
+    let finding = |(name, reasons): (String, Vec<String>)| {
+        let finding = left_finding(reasons.iter().map(String::as_str), &name)?;
+        Some(RunFinding { finding, programs: vec![name] })
+    };
+    files.into_iter().filter_map(finding).collect()
 }
 
 /// Rows of a table of corrections whose program is one of these, with the columns of `header`.

@@ -25,7 +25,8 @@ use crate::error::Result;
 
 /// Writes all files into `dir`, replacing an earlier result as a whole: a failure leaves `dir` as it was.
 ///
-/// Files in `dir` that do not belong to the earlier result (notes, say) are kept. Missing parents are made.
+/// Files in `dir` that do not belong to the earlier result (notes, say) are kept; where one of that was changed since, nothing is written. Missing
+/// parents are made.
 ///
 /// # Errors
 /// As [`ResultFolder::claim`] and [`NewResult::finish`]; anything that cannot be written.
@@ -35,7 +36,7 @@ pub fn write_all(dir: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
 }
 
 /// Writes files into a folder among whatever is there, all of them or none; none of them may be one of `inputs`, or take the place of a file that is
-/// not this program's own as it wrote it.
+/// not this program's own as it wrote it. What it wrote before it kept a record is kept under another name.
 ///
 /// # Errors
 /// A file that is one of the inputs, or is there and somebody else's; anything that cannot be written or renamed.

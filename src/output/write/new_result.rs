@@ -6,6 +6,7 @@ use std::io;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
+use super::own::{self, WRITTEN, sha256_of};
 use super::place::ResultFolder;
 use super::staging::Staging;
 use super::tree::write_synced;
@@ -28,7 +29,7 @@ impl ResultFolder {
     /// # Errors
     /// A folder that went away and cannot be made again.
     pub fn begin(self) -> Result<NewResult> {
-        Ok(NewResult { staging: self.stage()?, names: Mutex::default(), place: self })
+        Ok(NewResult { staging: self.stage()?, hashes: Mutex::default(), place: self })
     }
 }
 
@@ -37,7 +38,7 @@ impl ResultFolder {
 #[derive(Debug)]
 pub struct NewResult {
     staging: Staging,
-    names: Mutex<BTreeSet<String>>,
+    hashes: Mutex<BTreeMap<String, String>>,
     place: ResultFolder,
 }
 
@@ -55,7 +56,8 @@ impl NewResult {
             fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
         }
         write_synced(&path, bytes).map_err(|e| Error::io(&path, &e))?;
-        self.names.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned());
+        let sha256 = sha256_of(bytes);
+        self.hashes.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), sha256);
         Ok(())
     }
 
@@ -65,11 +67,13 @@ impl NewResult {
     /// When it cannot be moved there: the earlier one is kept. Where a file of the user is in the way, the new one is put
     /// beside, and the error says where.
     pub fn finish(self) -> Result<()> {
-        let Self { place, names, staging } = self;
-        let names = names.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let Self { place, hashes, staging } = self;
+        let hashes = hashes.into_inner().unwrap_or_else(PoisonError::into_inner);
         let target = &place.target;
         let io = |e: io::Error| Error::io(target, &e);
         fs::create_dir_all(target).map_err(io)?;
+        write_synced(&staging.path().join(WRITTEN), &own::record(target, &hashes)?).map_err(io)?;
+        let names: BTreeSet<String> = hashes.into_keys().chain([WRITTEN.to_owned()]).collect();
         let there = tree::there(target, &names).map_err(io)?;
         if let Some(file) = there.in_the_way(&names) {
             return Err(set_aside(&staging, target, file));

@@ -1,20 +1,27 @@
 //! Which files that stand where new ones go are this program's own, as it wrote them.
+//!
+//! A folder keeps the hash of every file that was written to it. What other programs and earlier versions left there has none: it is known by its mark.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
 use serde::Deserialize;
 
+use crate::error::{Code, Error, Result};
 use crate::output::corrections::{FINDINGS, FileFinding, TABLE};
 use crate::output::frames_record;
 use crate::output::written_programs::{self, WrittenAs};
 use crate::series::InputFile;
 
+/// The record of what was written to a folder: SHA-256 (lower-case hexadecimal) by name.
+pub(super) const WRITTEN: &str = ".robotcal-written.json";
+
 /// How reports begin.
 const PAGE: &str = "<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 /// How drawings begin, and what follows.
 const DRAWING: &str = "<svg xmlns=\"http://www.w3.org/2000/svg\" ";
-const DRAWN: [&str; 3] = ["role=\"img\" aria-label=", "class=\"scene\"", "width=\""];
+const DRAWN: [&str; 2] = ["role=\"img\" aria-label=", "class=\"scene\""];
 /// How reports of studies begin; the command follows.
 const STUDIES: [&str; 3] = [
     "# Stated uncertainties against known truth",
@@ -28,45 +35,73 @@ const COLUMNS: [&str; 2] = ["file,line,target,correction_mm,", ",x_m,y_m,z_m,qx,
 /// How programs with frames begin.
 const FRAME_PROGRAMS: [&str; 3] =
     ["&ACCESS RVP\nDEF robotcal_frames()", "MODULE RobotcalFrames\n", "def robotcal_frames():\n"];
-/// Endings of files without a mark: they are known by a file with one that is written with them.
-const UNMARKED: [&str; 3] = ["png", "pdf", "urdf"];
 /// Bytes in which a mark is looked for.
 const HEAD: usize = 4096;
 
-/// True where nothing of the user is lost when `name` in the folder is replaced by that of `files`: its bytes are the same, or those that a record
-/// of the folder says were written, or it has the mark of files that no record lists.
-pub(super) fn is_own(folder: &Path, name: &str, files: &[(String, &[u8])]) -> bool {
+/// What a file is that stands where a new one goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Standing {
+    /// It is as this program wrote it, or as it would write it again.
+    Own,
+    /// This program wrote it, and no record says whether somebody changed it since.
+    Unrecorded,
+    /// Somebody else made it, or changed it.
+    Others,
+}
+
+/// What `name` in the folder is, where `files` are to be written.
+pub(super) fn standing(folder: &Path, name: &str, files: &[(String, &[u8])]) -> Standing {
     let path = folder.join(name);
-    let Ok(there) = fs::read(&path) else { return false };
+    let Ok(there) = fs::read(&path) else { return Standing::Others };
     if is_same(name, &there, files) {
-        return true;
+        return Standing::Own;
     }
-    let of_frames = || {
-        let bytes = fs::read(folder.join(frames_record::FILE_NAME)).ok()?;
-        frames_record::recorded(&bytes).remove(name)
+    let written = written(folder);
+    let recorded = written.get(name).cloned().or_else(|| written_programs::recorded(folder, name));
+    let is_marked = || {
+        let goes_with_own = || written.is_empty() && goes_with_own(folder, name, files);
+        has_mark(name, &there)
+            || written_programs::written_as(&path, &there) == Some(WrittenAs::Other)
+            || goes_with_own()
     };
-    let recorded = written_programs::recorded(folder, name).or_else(of_frames);
     match recorded {
-        Some(sha256) => InputFile::of_bytes(Path::new(name), &there).sha256 == sha256,
-        // Records of earlier versions have no hash.
-        None => {
-            has_mark(name, &there)
-                || written_programs::written_as(&path, &there) == Some(WrittenAs::Other)
-                || (UNMARKED.contains(&ending(name)) && goes_with_own(folder, files))
-        }
+        Some(sha256) if sha256_of(&there) == sha256 => Standing::Own,
+        None if is_marked() => Standing::Unrecorded,
+        _ => Standing::Others,
     }
+}
+
+/// SHA-256, lower-case hexadecimal.
+pub(super) fn sha256_of(bytes: &[u8]) -> String {
+    InputFile::of_bytes(Path::new(""), bytes).sha256
+}
+
+/// Hashes of what was written to a folder, by name; none where it has no record.
+pub(super) fn written(folder: &Path) -> BTreeMap<String, String> {
+    fs::read(folder.join(WRITTEN)).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
+}
+
+/// The record of a folder that gets files with these hashes: with what else is still there.
+///
+/// # Errors
+/// None in practice: every name can be written as JSON.
+pub(super) fn record(folder: &Path, new: &BTreeMap<String, String>) -> Result<Vec<u8>> {
+    let mut all = written(folder);
+    all.retain(|name, _| folder.join(name).is_file());
+    all.extend(new.clone());
+    serde_json::to_vec_pretty(&all).map_err(|e| Error::new(Code::RecordNotWritten, WRITTEN, e, "report this"))
 }
 
 fn is_same(name: &str, there: &[u8], files: &[(String, &[u8])]) -> bool {
     files.iter().any(|(file, bytes)| file == name && *bytes == there)
 }
 
-fn goes_with_own(folder: &Path, files: &[(String, &[u8])]) -> bool {
-    let marked = files.iter().filter(|(name, _)| ["csv", "md", "json"].contains(&ending(name)));
-    let is_own = |name: &str| {
-        fs::read(folder.join(name)).is_ok_and(|there| is_same(name, &there, files) || has_mark(name, &there))
+/// Whether another of `files` is there that is the same or has a mark, as those of earlier versions are that were written together.
+fn goes_with_own(folder: &Path, name: &str, files: &[(String, &[u8])]) -> bool {
+    let is_own = |other: &str| {
+        fs::read(folder.join(other)).is_ok_and(|there| is_same(other, &there, files) || has_mark(other, &there))
     };
-    marked.into_iter().any(|(name, _)| is_own(name))
+    files.iter().any(|(other, _)| other != name && is_own(other))
 }
 
 fn ending(name: &str) -> &str {
@@ -78,8 +113,8 @@ fn has_mark(name: &str, there: &[u8]) -> bool {
     let head = String::from_utf8_lossy(&there[..there.len().min(HEAD)]).into_owned();
     let first = head.lines().next().unwrap_or_default();
     match ending(name) {
+        _ if head.starts_with(PAGE) => true,
         "json" => is_record(name, there),
-        "html" => head.starts_with(PAGE),
         "svg" => head.strip_prefix(DRAWING).is_some_and(|rest| DRAWN.iter().any(|next| rest.starts_with(next))),
         "md" => {
             let is_study = STUDIES.iter().any(|start| first.starts_with(start)) || first.contains(PLANNED);

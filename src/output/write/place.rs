@@ -5,10 +5,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::held::{Held, Taken};
+use super::own::{self, Standing, WRITTEN};
 use super::staging::Staging;
-use super::strays::{bring_back, part_name, sweep_beside};
+use super::strays::{bring_back, free_name, part_name, sweep_beside};
 use super::tree::write_synced;
-use super::{journal, own, tree};
+use super::{journal, tree};
 use crate::error::{Code, Error, Result};
 
 /// What to do where work would be lost.
@@ -18,6 +19,8 @@ const OTHER: &str = "choose another folder for the results";
 #[derive(Debug)]
 pub struct ResultFolder {
     given: PathBuf,
+    /// The option that names it.
+    option: &'static str,
     pub(super) target: PathBuf,
     made: Vec<PathBuf>,
     /// Held against other runs.
@@ -75,8 +78,19 @@ impl ResultFolder {
     /// A `dir` that is a file or cannot be written.
     pub fn among(dir: &Path) -> Result<Self> {
         let place = Self::made(dir)?;
+        // Otherwise whoever is at work there does it.
+        if let Ok(_held) = Held::at_once(&place.target) {
+            journal::complete(&place.target)?;
+        }
         place.try_writing()?;
         Ok(place)
+    }
+
+    /// This place, named by another option than `--out`.
+    #[must_use]
+    pub fn named_by(mut self, option: &'static str) -> Self {
+        self.option = option;
+        self
     }
 
     /// This place for files of these names, of which none is there that somebody else made.
@@ -84,7 +98,7 @@ impl ResultFolder {
     /// # Errors
     /// Such a file.
     pub fn for_files(self, names: &[&str]) -> Result<Self> {
-        names.iter().try_for_each(|name| self.require_replaceable(name, &[]))?;
+        names.iter().try_for_each(|name| self.require_replaceable(name, &[]).map(drop))?;
         Ok(self)
     }
 
@@ -95,7 +109,8 @@ impl ResultFolder {
 
     fn made(dir: &Path) -> Result<Self> {
         let missing = missing(dir)?;
-        let mut place = Self { given: dir.to_path_buf(), target: PathBuf::new(), made: Vec::new(), held: None };
+        let mut place =
+            Self { given: dir.to_path_buf(), option: "--out", target: PathBuf::new(), made: Vec::new(), held: None };
         for folder in missing {
             fs::create_dir(&folder).map_err(|e| Error::io(&folder, &e))?;
             place.made.push(folder);
@@ -121,8 +136,8 @@ impl ResultFolder {
     }
 
     fn holds_something(&self) -> Result<bool> {
-        let mut entries = fs::read_dir(&self.target).map_err(|e| Error::io(&self.target, &e))?;
-        Ok(entries.next().is_some())
+        let entries = fs::read_dir(&self.target).map_err(|e| Error::io(&self.target, &e))?;
+        Ok(entries.filter_map(io::Result::ok).any(|entry| entry.file_name() != WRITTEN))
     }
 
     fn try_writing(&self) -> Result<()> {
@@ -152,10 +167,18 @@ impl ResultFolder {
     /// As [`write_beside`](super::write_beside).
     pub fn write_beside(&self, files: &[(String, &[u8])], inputs: &[PathBuf]) -> Result<()> {
         let target = &self.target;
-        fs::create_dir_all(target).map_err(|e| Error::io(target, &e))?;
+        let fail = |e: io::Error| Error::io(target, &e);
+        fs::create_dir_all(target).map_err(fail)?;
+        // Other runs may put other files here.
+        let held = Held::when_free(target);
+        journal::complete(target)?;
+        journal::sweep(target);
+        let mut unrecorded = Vec::new();
         for (k, (name, _)) in files.iter().enumerate() {
             self.require_its_own(name, inputs)?;
-            self.require_replaceable(name, files)?;
+            if self.require_replaceable(name, files)? == Some(Standing::Unrecorded) {
+                unrecorded.push(target.join(name));
+            }
             if files[..k].iter().any(|(other, _)| other == name) {
                 let path = target.join(name);
                 return Err(Error::new(
@@ -166,15 +189,14 @@ impl ResultFolder {
                 ));
             }
         }
-        // Other runs may put other files here.
-        let held = Held::when_free(target);
-        journal::complete(target)?;
-        journal::sweep(target);
-        let staging = Staging::Inside(journal::stage(target).map_err(|e| Error::io(target, &e))?);
-        for (name, bytes) in files {
+        let staging = Staging::Inside(journal::stage(target).map_err(fail)?);
+        let hashes = files.iter().map(|(name, bytes)| (name.clone(), own::sha256_of(bytes))).collect();
+        let record = own::record(target, &hashes)?;
+        for (name, bytes) in files.iter().map(|(n, b)| (n.as_str(), *b)).chain([(WRITTEN, record.as_slice())]) {
             write_synced(&staging.path().join(name), bytes).map_err(|e| Error::io(&target.join(name), &e))?;
         }
-        journal::commit(target, &files.iter().map(|(name, _)| name.clone()).collect(), &[])?;
+        unrecorded.iter().try_for_each(|file| keep(file))?;
+        journal::commit(target, &hashes.into_keys().chain([WRITTEN.to_owned()]).collect(), &[])?;
         drop(held);
         Ok(())
     }
@@ -195,17 +217,20 @@ impl ResultFolder {
         })
     }
 
-    fn require_replaceable(&self, name: &str, files: &[(String, &[u8])]) -> Result<()> {
-        let is_there = self.target.join(name).symlink_metadata().is_ok();
-        if !is_there || own::is_own(&self.target, name, files) {
-            return Ok(());
+    /// What is there; `None` where nothing is.
+    fn require_replaceable(&self, name: &str, files: &[(String, &[u8])]) -> Result<Option<Standing>> {
+        if self.target.join(name).symlink_metadata().is_err() {
+            return Ok(None);
         }
-        Err(Error::new(
-            Code::OutputExists,
-            self.given.join(name).display(),
-            "is there already, and is not what this program wrote there",
-            "name another place for the result (--out), or move this file away",
-        ))
+        match own::standing(&self.target, name, files) {
+            Standing::Others => Err(Error::new(
+                Code::OutputExists,
+                self.given.join(name).display(),
+                "is there already, and is not what this program wrote there",
+                format!("name another place for the result ({}), or move this file away", self.option),
+            )),
+            standing => Ok(Some(standing)),
+        }
     }
 
     fn require_its_own(&self, name: &str, inputs: &[PathBuf]) -> Result<()> {
@@ -219,7 +244,7 @@ impl ResultFolder {
                 Code::OutputIsInput,
                 path.display(),
                 "is the input itself",
-                "choose another folder with --out",
+                format!("name another place for the result ({})", self.option),
             ));
         }
         Ok(())
@@ -231,6 +256,18 @@ impl Drop for ResultFolder {
         // Only folders in which nothing is go.
         self.made.iter().rev().all(|folder| fs::remove_dir(folder).is_ok());
     }
+}
+
+/// Keeps a file that is to be replaced under another name, as somebody may have worked with it.
+fn keep(file: &Path) -> Result<()> {
+    let kept = free_name(file.to_path_buf());
+    fs::copy(file, &kept).map_err(|e| Error::io(&kept, &e))?;
+    tracing::warn!(
+        "{}: no record says whether it was changed since it was written; it is kept as {}",
+        file.display(),
+        kept.display()
+    );
+    Ok(())
 }
 
 /// Folders that have to be made, the outermost first.

@@ -87,7 +87,7 @@ pub(super) fn sweep_beside(target: &Path) {
         let _ = fs::remove_dir_all(part);
     }
     for stray in [WHOLE, OLD].into_iter().flat_map(|kind| beside(target, kind)) {
-        let own = tree::earlier_files(&stray).unwrap_or_default();
+        let own = tree::own_files(&stray);
         if let Err(error) = sweep(&stray, target, &own) {
             tracing::debug!("{}: {error}", stray.display());
         }
@@ -119,7 +119,7 @@ pub(super) fn sweep(stray: &Path, target: &Path, own: &BTreeSet<String>) -> io::
 }
 
 /// The path itself, or another name where it is taken.
-fn free_name(path: PathBuf) -> PathBuf {
+pub(super) fn free_name(path: PathBuf) -> PathBuf {
     let is_free = |p: &PathBuf| p.symlink_metadata().is_err();
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let others = (1..1000).map(|k| path.with_file_name(format!("{name}.kept-{k}")));

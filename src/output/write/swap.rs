@@ -18,7 +18,7 @@ pub(super) fn swap(target: &Path, part: &Path, foreign: &[PathBuf]) -> io::Resul
         fs::hard_link(target.join(file), link)?;
     }
     // The folder that is the target in a moment, and its earlier files as long as they are here.
-    let own = tree::earlier_files(target).unwrap_or_default();
+    let own = tree::own_files(target);
     let held = Held::at_once(part);
     fs::rename(part, &new)?;
     if let Err(error) = exchange(&new, target) {

@@ -7,6 +7,7 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::own::{self, WRITTEN};
 use crate::output::detection_files::OVERLAY_FOLDER;
 use crate::output::{detection_files, plan_files, solution_json, stand_alone_files};
 use crate::series::InputFile;
@@ -43,7 +44,7 @@ impl There {
 
 /// Looks at the target of a result with these names.
 pub(super) fn there(target: &Path, names: &BTreeSet<String>) -> io::Result<There> {
-    let own = earlier_files(target).unwrap_or_default();
+    let own = own_files(target);
     let mut there = There::default();
     for entry in entries(target, &folders(own.iter().chain(names)))? {
         match entry.to_str().filter(|e| own.contains(*e)) {
@@ -79,6 +80,13 @@ pub(super) fn earlier_files(target: &Path) -> Option<BTreeSet<String>> {
     RECORDS.iter().find_map(listed)
 }
 
+/// The same with the record of the folder itself, which is there in any case.
+pub(super) fn own_files(target: &Path) -> BTreeSet<String> {
+    let mut own = earlier_files(target).unwrap_or_default();
+    own.insert(WRITTEN.to_owned());
+    own
+}
+
 /// Records in a folder of other commands than that whose own this is.
 pub(super) fn other_record(target: &Path, own: &str) -> Option<&'static str> {
     RECORDS.into_iter().find(|record| *record != own && target.join(record).symlink_metadata().is_ok())
@@ -92,12 +100,14 @@ pub(super) fn used_since(target: &Path) -> Option<String> {
         as_written: BTreeMap<String, String>,
     }
     let read = |record: &str| serde_json::from_slice::<Listed>(&fs::read(target.join(record)).ok()?).ok();
-    let is_other = |(file, sha256): &(&String, &String)| {
+    let is_other = |(file, sha256): &(String, String)| {
         let path = target.join(file);
-        path.exists() && InputFile::of_file(&path).is_ok_and(|now| now.sha256 != **sha256)
+        path.exists() && InputFile::of_file(&path).is_ok_and(|now| now.sha256 != *sha256)
     };
-    let listed: Vec<Listed> = SERIES.into_iter().filter_map(read).collect();
-    let changed = listed.iter().flat_map(|l| &l.as_written).find(is_other).map(|(file, _)| file.clone());
+    let listed = SERIES.into_iter().filter_map(read);
+    let own = earlier_files(target).unwrap_or_default();
+    let written = own::written(target).into_iter().filter(|(file, _)| own.contains(file));
+    let changed = listed.flat_map(|l| l.as_written).chain(written).find(is_other).map(|(file, _)| file);
     let is_series = || SERIES.iter().any(|record| target.join(record).exists()) && target.join(IMAGES).exists();
     changed.or_else(|| is_series().then(|| IMAGES.to_owned()))
 }
