@@ -3,6 +3,7 @@
 mod array;
 mod calls;
 mod carried;
+mod cycle;
 mod frames;
 mod moves;
 mod off_zero;
@@ -106,16 +107,17 @@ fn reading(
     for file in files.iter().enumerate() {
         task.assignments(reader(file)?);
         Task::look_for_calls(&mut references, reader(file)?);
-        task.switching.look_through(reader(file)?);
+        let is_known = |name: &str| task.data.contains_key(name);
+        task.switching.look_through(reader(file)?, is_known);
     }
     task.changed_by_calls(&references);
-    task.way.program.put = task.switching.put_anywhere.by_reading(setting.axes, |reading| task.unit(reading).0);
     for file in files.iter().enumerate() {
         task.way.start_afresh();
         task.statements(reader(file)?)?;
         task.switching.all_end();
     }
     task.unvisited();
+    task.way.program.put = task.switching.put_anywhere.by_reading(setting.axes, |reading| task.unit(reading).0);
     Ok((task.way.finished(), task.switching.found()))
 }
 
