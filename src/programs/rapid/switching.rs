@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::cycle::{AGAIN, Cycle};
-use super::off_zero::{external_axes, moves_untold};
+use super::off_zero::external_axes;
 use super::switched::{
     DISPLACES, INDEPENDENT, INDEPENDENT_ENDS, OFFSETS, Switched, Watched, locks, named_axis, switch,
 };
@@ -142,7 +142,7 @@ impl Switching {
     }
 
     /// Which checks of configurations are switched off anywhere in a text, and whether a displacement is begun.
-    pub fn look_through(&mut self, mut reader: Reader<'_>, is_known: impl Fn(&str) -> bool) {
+    pub fn look_through(&mut self, mut reader: Reader<'_>) {
         self.flow.file_begins(reader.index);
         while !reader.done() {
             if let Some((which, Watched::Off)) = switch(&reader) {
@@ -156,7 +156,7 @@ impl Switching {
             let is_independent = name.as_ref().is_some_and(|word| INDEPENDENT.contains(&word.as_str()));
             self.independents.extend(is_independent.then(|| named_axis(&reader)));
             external_axes(&mut self.put_anywhere, &mut reader);
-            if moves_untold(&reader, &is_known) {
+            if is_independent {
                 self.put_anywhere.note_all();
             }
             connected(&reader).iter().for_each(|trap| self.connected.extend(self.flow.meant(trap)));
