@@ -33,24 +33,35 @@ impl OffZero {
     }
 }
 
-/// Where the texts put external axes, wherever that is, by their number from 0: in the unit of the program, `None` where they do not tell.
+/// Where the texts put external axes, wherever that is.
 #[derive(Debug, Clone, Default)]
-pub(super) struct PutAnywhere(Vec<(usize, Option<f64>)>);
+pub(super) struct PutAnywhere {
+    /// By their number from 0: in the unit of the program, `None` where they do not tell.
+    places: Vec<(usize, Option<f64>)>,
+    /// True where something goes of which they do not tell where.
+    goes_untold: bool,
+}
 
 impl PutAnywhere {
     /// A text puts an axis there.
     pub fn note(&mut self, axis: usize, place: Option<f64>) {
-        self.0.push((axis, place));
+        self.places.push((axis, place));
     }
 
     /// A text may put any of them anywhere.
     pub fn note_all(&mut self) {
-        self.0.extend((0..EXTERNAL_AXES).map(|axis| (axis, None)));
+        self.places.extend((0..EXTERNAL_AXES).map(|axis| (axis, None)));
+    }
+
+    /// Something goes of which the texts do not tell where. Of an axis that the description lacks it is taken that it stands at zero, unless a text
+    /// itself puts it elsewhere.
+    pub fn note_untold(&mut self) {
+        self.goes_untold = true;
     }
 
     /// Those that the texts put elsewhere than at zero, at places that count as not known.
     pub fn off_zero(&self) -> OffZero {
-        OffZero(self.0.iter().filter(|(_, place)| *place != Some(0.0)).map(|(axis, _)| (*axis, None)).collect())
+        OffZero(self.places.iter().filter(|(_, place)| *place != Some(0.0)).map(|(axis, _)| (*axis, None)).collect())
     }
 
     /// Those of the description, by their readings: `axes` are the readings of the program's axes, `si` the unit of a reading.
@@ -59,7 +70,8 @@ impl PutAnywhere {
             let reading = *axes.get(ARM_AXES + axis)?;
             Some((reading, place.map(|value| value * si(reading))))
         };
-        self.0.iter().filter_map(one).collect()
+        let untold = axes.iter().skip(ARM_AXES).filter(|_| self.goes_untold).map(|reading| (*reading, None));
+        self.places.iter().filter_map(one).chain(untold).collect()
     }
 }
 
@@ -78,6 +90,18 @@ impl Either for OffZero {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_goes_where_no_text_tells_may_have_moved_axes_of_the_description_alone() {
+        let axes = [1, 2, 3, 4, 5, 6, 0];
+        let mut put = PutAnywhere::default();
+        put.note(0, Some(500.0));
+        assert_eq!(put.by_reading(&axes, |_| 1e-3), [(0, Some(0.5))]);
+        put.note_untold();
+        assert_eq!(put.by_reading(&axes, |_| 1e-3), [(0, Some(0.5)), (0, None)]);
+        assert_eq!(put.by_reading(&axes[..6], |_| 1e-3), []);
+        assert_eq!(put.off_zero(), OffZero(BTreeMap::from([(0, None)])));
+    }
 
     #[test]
     fn an_axis_that_is_at_zero_on_one_way_only_may_stand_anywhere() {

@@ -332,6 +332,16 @@ impl<T: Followed> Flow<T> {
         ends.and_modify(|all| *all = all.merged(now, BRANCHES)).or_insert_with(|| now.clone());
     }
 
+    /// What has passed under this name.
+    pub fn passed(&self, name: &str) -> Option<&T> {
+        self.known.ends.get(name)
+    }
+
+    /// False behind a statement that goes elsewhere.
+    pub fn is_reached(&self) -> bool {
+        self.is_reached
+    }
+
     /// What holds where a part of the innermost routine has run from here.
     pub fn behind_part(&self, part: &str, now: &T) -> Option<T> {
         let name = part_name(&self.routines.last()?.name, part);

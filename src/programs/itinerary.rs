@@ -63,6 +63,11 @@ impl Stands {
         Self::at(Origin::Begin)
     }
 
+    /// The text does not tell from where it has come.
+    pub fn unknown() -> Self {
+        Self::at(Origin::Unknown)
+    }
+
     fn gone(&self, gone: Gone) -> Self {
         Self(self.0.iter().map(|stand| stand.gone(gone)).collect())
     }
@@ -255,7 +260,7 @@ impl Itinerary {
     /// The next target is approached from one of several: from none in particular.
     pub fn lose(&mut self, now: &mut Stands) {
         self.from = Approach::Unknown;
-        *now = Stands::at(Origin::Unknown);
+        *now = Stands::unknown();
     }
 
     /// The program with all ways to its targets.

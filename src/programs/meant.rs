@@ -13,6 +13,15 @@ use crate::model::robot::Robot;
 /// An external axis that is no further (rad or m) from `--start` stands there.
 const AT_START: f64 = 1e-6;
 
+/// Whether the text tells where a reading stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Told {
+    No,
+    /// It would with `--start`, which is not given.
+    WithStart,
+    Yes,
+}
+
 /// What a target means.
 #[derive(Debug, Clone)]
 pub(super) struct Meant {
@@ -20,8 +29,8 @@ pub(super) struct Meant {
     pub kind: TargetKind,
     /// Its readings, rad or m.
     pub readings: Vec<f64>,
-    /// False for readings of which the text does not tell where they stand.
-    told: Vec<bool>,
+    /// Whether the text tells where they stand, whichever way the robot comes.
+    told: Vec<Told>,
     /// True for readings that keep their value.
     pub held: Vec<bool>,
     /// How its posture is known.
@@ -45,8 +54,18 @@ pub(super) fn meant(
     let targets = &program.targets;
     let arrivals = targets.iter().map(arrivals).collect();
     let found = targets.iter().map(|_| Found::Nothing).collect();
-    let stays = (0..held.len()).map(|i| finder.start(i).is_some_and(|start| stays(program, i, start))).collect();
-    let mut meaning = Meaning { targets, arrivals, controller, held, finder, stays, found, followed: BTreeSet::new() };
+    let stays = (0..held.len()).map(|i| stays(program, i, finder.start(i))).collect();
+    let mut meaning = Meaning {
+        targets,
+        arrivals,
+        controller,
+        held,
+        finder,
+        stays,
+        found,
+        followed: BTreeSet::new(),
+        has_more: false,
+    };
     while meaning.finds_more() || meaning.begins_anywhere() {}
     let one = |found| match found {
         Found::Meant(meant, _) => Ok(*meant),
@@ -60,9 +79,10 @@ fn unreached() -> Why {
     Why::new(LeftReason::PostureUnknown, "its posture is not known: nothing leads to it")
 }
 
-/// True where the text puts a reading nowhere else than there, rad or m.
-fn stays(program: &Program, reading: usize, place: f64) -> bool {
-    let is_there = |value: &Option<f64>| value.is_some_and(|value| (value - place).abs() < AT_START);
+/// True where the text puts a reading nowhere else than at its start, rad or m: without one, nowhere at all.
+fn stays(program: &Program, reading: usize, start: Option<f64>) -> bool {
+    let is_there =
+        |value: &Option<f64>| value.zip(start).is_some_and(|(value, start)| (value - start).abs() < AT_START);
     program.put.iter().filter(|(put, _)| *put == reading).all(|(_, value)| is_there(value))
 }
 
@@ -84,19 +104,21 @@ struct Meaning<'a> {
     controller: &'a Robot,
     held: &'a [bool],
     finder: Finder<'a>,
-    /// True for readings that the program puts nowhere else than at `--start`.
+    /// True for readings that the program puts nowhere else than at `--start`; without that, nowhere.
     stays: Vec<bool>,
     found: Vec<Found>,
     /// Targets with the ways that were followed: the number of the arrival, and where it begins.
     followed: BTreeSet<(usize, usize, Approach)>,
+    /// True where a way was followed since this was asked.
+    has_more: bool,
 }
 
 impl Meaning<'_> {
     /// Follows all ways that begin where something is known; true where one of them was new.
     fn finds_more(&mut self) -> bool {
-        let before = self.followed.len();
+        self.has_more = false;
         (0..self.targets.len()).for_each(|k| self.look_at(k));
-        self.followed.len() > before
+        self.has_more
     }
 
     /// Where targets are reached from each other alone, nothing tells the joints at the first of them.
@@ -123,8 +145,9 @@ impl Meaning<'_> {
             if matches!(self.found[k], Found::Left(_)) {
                 return;
             }
-            if !(is_told && has_known && origin.target().is_none()) {
-                self.follow(k, n, origin);
+            match is_told && has_known && origin.target().is_none() {
+                true => self.tells_no_more(k, &self.told(&self.targets[k].kind, None, origin)),
+                false => self.follow(k, n, origin),
             }
         }
     }
@@ -168,6 +191,7 @@ impl Meaning<'_> {
         if !self.followed.insert((k, n, origin)) {
             return;
         }
+        self.has_more = true;
         let new = self.by(k, n, origin);
         match (new, &self.found[k]) {
             (Err(why), _) => self.found[k] = Found::Left(why),
@@ -175,7 +199,17 @@ impl Meaning<'_> {
                 self.found[k] = Found::Left(self.differing(k, *first, origin));
             }
             (Ok(new), Found::Nothing) => self.found[k] = Found::Meant(Box::new(new), origin),
-            (Ok(_), _) => {}
+            (Ok(new), _) => self.tells_no_more(k, &new.told),
+        }
+    }
+
+    /// Another way to a target tells this much of its readings: what was found with more is looked at again.
+    fn tells_no_more(&mut self, k: usize, told: &[Told]) {
+        let Found::Meant(known, _) = &mut self.found[k] else { return };
+        let least: Vec<Told> = known.told.iter().zip(told).map(|(known, told)| *known.min(told)).collect();
+        if least != known.told {
+            known.told = least;
+            self.followed.retain(|(_, _, origin)| origin.target() != Some(k));
         }
     }
 
@@ -200,7 +234,7 @@ impl Meaning<'_> {
         });
         let straight = matches!(origin, Approach::From(_));
         let kept = before.filter(|_| straight);
-        let kind = self.completed(&self.targets[k], kept, origin)?;
+        let kind = self.completed(k, kept, origin)?;
         let told = self.told(&self.targets[k].kind, kept, origin);
         let held = |own: Vec<bool>| own.iter().zip(self.held).map(|(a, h)| *a || *h).collect::<Vec<bool>>();
         match &kind {
@@ -220,44 +254,61 @@ impl Meaning<'_> {
     }
 
     /// Which readings of a target the text tells, be it with the target before or with `--start`.
-    fn told(&self, kind: &TargetKind, before: Option<&Meant>, origin: Approach) -> Vec<bool> {
-        let kept = |i: usize| before.is_some_and(|b| b.told[i]) || self.by_start(i, origin).is_some();
+    fn told(&self, kind: &TargetKind, before: Option<&Meant>, origin: Approach) -> Vec<Told> {
+        let kept = |i: usize| before.map_or(Told::No, |b| b.told[i]).max(self.told_by_start(i, origin));
         match kind {
             TargetKind::Joints(joints) => {
-                joints.readings.iter().enumerate().map(|(i, q)| q.is_finite() || kept(i)).collect()
+                let one = |(i, q): (usize, &f64)| if q.is_finite() { Told::Yes } else { kept(i) };
+                joints.readings.iter().enumerate().map(one).collect()
             }
-            TargetKind::Pose(_) => vec![true; self.held.len()],
+            TargetKind::Pose(_) => vec![Told::Yes; self.held.len()],
         }
     }
 
     /// Where `--start` has an external axis, at the beginning of the program, or of a routine where no statement puts it elsewhere; rad or m.
     fn by_start(&self, reading: usize, origin: Approach) -> Option<f64> {
+        self.finder.start(reading).filter(|_| self.told_by_start(reading, origin) == Told::Yes)
+    }
+
+    fn told_by_start(&self, reading: usize, origin: Approach) -> Told {
         let counts = match origin {
             Approach::Begin => true,
             Approach::Call => self.stays[reading],
             Approach::From(_) | Approach::Beyond(_) | Approach::Unknown => false,
         };
-        self.finder.start(reading).filter(|_| counts)
+        match self.finder.start(reading) {
+            _ if !counts => Told::No,
+            Some(_) => Told::Yes,
+            None => Told::WithStart,
+        }
+    }
+
+    /// True where `--start` would tell where an axis stands on all ways to a target.
+    fn start_would_tell(&self, k: usize, reading: usize) -> bool {
+        let mut origins = BTreeSet::new();
+        self.arrivals[k].iter().for_each(|a| self.origins(a.from, &mut BTreeSet::new(), &mut origins));
+        origins.iter().all(|origin| match (origin, origin.target().map(|j| &self.found[j])) {
+            (Approach::From(_), Some(Found::Meant(meant, _))) => meant.told[reading] > Told::No,
+            _ => self.told_by_start(reading, *origin) > Told::No,
+        })
     }
 
     /// Why a pose stays as it is that leaves out an external axis of which nothing tells where it stands.
-    fn axis_untold(&self, reading: usize) -> Why {
+    fn axis_untold(&self, k: usize, reading: usize) -> Why {
         let name = &self.controller.chain.readings[reading];
-        let remedy = match self.finder.start(reading) {
-            None => "write its place in the target, or give --start",
-            Some(_) => {
-                "write its place in the target: --start tells it where the program begins, and at the beginning of a routine where nothing moves it"
-            }
-        };
-        let words = format!("it leaves out {name}, and nothing tells where that stands ({remedy})");
+        let gives_start = self.finder.start(reading).is_none() && self.start_would_tell(k, reading);
+        let remedy = if gives_start { ", or give --start" } else { "" };
+        let words = format!(
+            "it leaves out {name}, and nothing tells where that stands (write its place in the target{remedy})"
+        );
         Why::new(LeftReason::Incomplete, words)
     }
 
     /// The target with what its text leaves out, which is what the target before it says.
-    fn completed(&self, target: &Target, before: Option<&Meant>, origin: Approach) -> Understood<TargetKind> {
+    fn completed(&self, k: usize, before: Option<&Meant>, origin: Approach) -> Understood<TargetKind> {
         let unknown =
             || Why::new(LeftReason::Incomplete, "it leaves numbers out, and the target before it is not known");
-        let mut kind = target.kind.clone();
+        let mut kind = self.targets[k].kind.clone();
         match &mut kind {
             TargetKind::Joints(joints) => {
                 for (i, q) in joints.readings.iter_mut().enumerate().filter(|(_, q)| !q.is_finite()) {
@@ -272,8 +323,8 @@ impl Meaning<'_> {
             TargetKind::Pose(pose) if pose.is_partial() => {
                 for (i, place) in pose.fixed.iter_mut().enumerate() {
                     if place.is_some_and(|value| !value.is_finite()) {
-                        let kept = before.filter(|b| b.told[i]).map(|b| b.readings[i]);
-                        *place = Some(kept.or(self.by_start(i, origin)).ok_or_else(|| self.axis_untold(i))?);
+                        let kept = before.filter(|b| b.told[i] == Told::Yes).map(|b| b.readings[i]);
+                        *place = Some(kept.or(self.by_start(i, origin)).ok_or_else(|| self.axis_untold(k, i))?);
                     }
                 }
                 if pose.is_partial() {

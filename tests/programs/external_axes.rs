@@ -10,7 +10,7 @@ use crate::robots::{kr6_urdf, repo};
 use robotcal::geom::Pose;
 use robotcal::model::robot::Robot;
 use robotcal::programs::{
-    self, Language, LeftReason, Models, Postures, Program, ProgramSetting, TargetOutcome, TextFile,
+    self, Language, LeftReason, Models, Postures, Program, ProgramSetting, Target, TargetOutcome, TextFile,
 };
 use robotcal::urdf::{Chain, read};
 
@@ -49,6 +49,19 @@ fn corrected_in((chain, real): &(Chain, Robot), axes: &[usize], name: &str, text
         TargetOutcome::Left(why) => (target.line, Err(why.reason)),
     });
     left.chain(outcomes).collect()
+}
+
+/// Why targets stay as they are where `--start` is not given, by their lines.
+fn words((chain, real): &(Chain, Robot), name: &str, text: &str) -> BTreeMap<usize, String> {
+    let program = read_program(chain, &[1, 2, 3, 4, 5, 6, 0], name, text);
+    let nominal = Robot::nominal(chain.clone());
+    let models = Models { controller: &nominal, from: &nominal, to: real, frames: None, beyond: [None, None] };
+    let done = programs::compensate(&program, models, &Postures { held: vec![false; 7], start: None });
+    let of = |(target, outcome): (&Target, TargetOutcome)| match outcome {
+        TargetOutcome::Done(_) => None,
+        TargetOutcome::Left(why) => Some((target.line, why.words)),
+    };
+    program.targets.iter().zip(done.outcomes).filter_map(of).collect()
 }
 
 /// The flange beside the start, with the rail at `rail_m`.
@@ -133,7 +146,7 @@ fn start_tells_where_the_rail_stands_that_nothing_before_a_pose_tells() {
     for (body, start, is_met) in [
         (go.clone(), Some(0.5), true),
         (go.clone(), None, false),
-        (format!("{go}{elsewhere}"), Some(0.5), true),
+        (format!("{go}EXIT;\n{elsewhere}"), Some(0.5), true),
         (format!("SetDO do1,1;\nWaitTime 1;\nn:=1;\n{go}"), Some(0.5), true),
         (format!("rPick;\n{go}"), Some(0.5), false),
     ] {
@@ -144,6 +157,207 @@ fn start_tells_where_the_rail_stands_that_nothing_before_a_pose_tells() {
             true => assert_meets_at(&robot, &found, line, 0.5, &text),
             false => assert_eq!(found[&line], Err(LeftReason::Incomplete), "{text}"),
         }
+    }
+}
+
+/// Whether the line with the first `LIN` or `MoveL` is corrected for a rail at 0.5 m, where `--start` has it.
+fn is_met(robot: &(Chain, Robot), name: &str, text: &str) -> bool {
+    let line = first_line(text, if name.ends_with(".src") { "LIN " } else { "MoveL " });
+    let found = corrected(robot, name, text, Some(0.5));
+    if found[&line] == Err(LeftReason::Incomplete) {
+        return false;
+    }
+    assert_meets_at(robot, &found, line, 0.5, text);
+    true
+}
+
+/// A routine that is called begins with the rail where `--start` has it, unless anything may have moved it meanwhile.
+#[test]
+fn start_does_not_count_in_a_routine_where_something_may_have_moved_the_rail() {
+    let robot = on_rail();
+    let lin = format!("LIN {}\n", krl_frame(&pose(&robot, 0.5), ""));
+    let arm = format!("PTP {}\n", axes(""));
+    for (moved, counts) in [
+        ("", true),
+        ("$OUT[1]=TRUE\n", true),
+        ("ASYPTP {E1 500}\n", false),
+        ("ASYPTP XPARK\n", false),
+        ("ASYCONT {E1 500}\n", false),
+        ("ASYSTOP\n", false),
+        ("ASYCANCEL 1\n", false),
+        ("$ASYNC_AXIS='B0001'\n", false),
+        ("PICK()\n", false),
+        ("PTP XHOME\n", false),
+        ("PTP $POS_RET\n", false),
+        ("PTP {E1 500}\n", true),
+        ("PTP {E1 700}\n", false),
+        ("LIN_REL {E1 500}\n", false),
+        ("PTP_REL {X 5}\n", false),
+    ] {
+        for between in ["", &arm] {
+            let text =
+                format!("{BEGIN}{moved}{between}sub()\nEND\nDEF sub()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{lin}END\n");
+            assert_eq!(is_met(&robot, "a.src", &text), counts, "{text}");
+        }
+    }
+    let go = format!("MoveL {},v10,fine,tool0;\n", robtarget(&pose(&robot, 0.5), "9E9"));
+    let arm = format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget("9E9"));
+    let external = |eax: &str| format!("[[9E9,9E9,9E9,9E9,9E9,9E9],[{eax},9E9,9E9,9E9,9E9,9E9]]");
+    for (moved, counts) in [
+        (String::new(), true),
+        ("SetDO do1,1;\nActUnit STN1;\n".to_owned(), true),
+        (format!("MoveExtJ {},vrot10,fine;\n", external("500")), false),
+        ("MoveExtJ jExt,vrot10,fine;\n".to_owned(), false),
+        ("SearchExtJ di1,jFound,jExt,vrot10;\n".to_owned(), false),
+        ("MoveAbsJ jHome,v10,fine,tool0;\n".to_owned(), false),
+        ("rPick;\n".to_owned(), false),
+        ("%\"rPick\"%;\n".to_owned(), false),
+        ("%\"rPick\"+NumToStr(n,0)%;\n".to_owned(), false),
+        ("IF a=1 THEN\nrPick;\nENDIF\n".to_owned(), false),
+        ("jp.extax:=[700,9E9,9E9,9E9,9E9,9E9];\n".to_owned(), false),
+        ("jp.extax.eax_a:=9E9;\n".to_owned(), true),
+    ] {
+        for between in ["", &arm] {
+            let text = module(&format!("{moved}{between}rSub;\nENDPROC\nPROC rSub()\n{go}"));
+            assert_eq!(is_met(&robot, "m.mod", &text), counts, "{text}");
+        }
+    }
+}
+
+/// `%"name"%` calls the routine of this name.
+#[test]
+fn a_routine_that_is_called_by_a_text_may_have_moved_the_rail() {
+    let robot = on_rail();
+    let head = format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget("500"));
+    let go = format!("MoveL {},v10,fine,tool0;\n", robtarget(&pose(&robot, 0.5), "9E9"));
+    let still = "ENDPROC\nPROC rPick()\nWaitTime 1;\n";
+    for (call, more, counts) in [
+        ("%\"rPick\"%;\n", "", false),
+        ("%\"rPick\"%;\n", still, true),
+        ("%\"rPick\"% 1,2;\n", still, true),
+        ("%stName%;\n", still, false),
+        ("%\"rPick\"+st%;\n", still, false),
+        ("IF a=1 %\"rPlace\"%;\n", still, false),
+        ("CallByVar \"rPick\",1;\n", still, false),
+    ] {
+        let text = module(&format!("{head}{call}{go}{more}"));
+        assert_eq!(is_met(&robot, "m.mod", &text), counts, "{text}");
+    }
+}
+
+/// Behind its end `main` begins again, with the rail where that has left it.
+#[test]
+fn the_first_target_of_main_has_the_rail_of_its_end_in_all_cycles_but_the_first() {
+    let robot = on_rail();
+    let go = format!("MoveL {},v10,fine,tool0;\n", robtarget(&pose(&robot, 0.5), "9E9"));
+    let at = |eax: &str| format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget(eax));
+    for (body, counts) in [
+        (go.clone(), true),
+        (format!("{go}{}", at("500")), true),
+        (format!("{go}{}", at("700")), false),
+        (format!("{go}{}", at("9E9")), true),
+        (format!("{go}rPick;\n"), false),
+        (format!("{go}WHILE TRUE DO\n{}ENDWHILE\n", at("700")), true),
+        (format!("{go}WHILE a DO\n{}ENDWHILE\n", at("700")), false),
+        (format!("{go}WHILE TRUE DO\n{}IF a=1 RETURN;\nENDWHILE\n", at("700")), false),
+        (format!("{go}WHILE TRUE DO\n{}IF a=1 ExitCycle;\nENDWHILE\n", at("700")), false),
+        (format!("{go}WHILE TRUE DO\nrOut;\nENDWHILE\nENDPROC\nPROC rOut()\n{}ExitCycle;\n", at("700")), false),
+        (format!("{go}{}Stop;\nEXIT;\n", at("700")), true),
+        (format!("{}{go}{}", at("500"), at("700")), true),
+    ] {
+        let text = module(&body);
+        assert_eq!(is_met(&robot, "m.mod", &text), counts, "{text}");
+    }
+}
+
+/// A target of axis angles that leaves the rail out does not tell where it stands, if one way to it does not.
+#[test]
+fn the_rail_is_told_behind_a_joint_target_only_where_all_ways_to_it_tell_it() {
+    let robot = on_rail();
+    let (lin, arm) = (format!("LIN {}\n", krl_frame(&pose(&robot, 0.5), "")), format!("PTP {}\n", axes("")));
+    let told = format!("PTP {}\n", axes(",E1 500.0"));
+    for (other, counts) in
+        [(told.clone(), true), ("PTP XHOME\n".to_owned(), false), ("LIN_REL {E1 5}\n".to_owned(), false)]
+    {
+        for branches in [[&told, &other], [&other, &told]] {
+            let [one, two] = branches;
+            let text = format!("{BEGIN}IF $IN[1] THEN\n{one}ELSE\n{two}ENDIF\n{arm}{arm}{lin}END\n");
+            assert_eq!(is_met(&robot, "a.src", &text), counts, "{text}");
+        }
+    }
+}
+
+/// The words of targets that stay as they are offer `--start` where it tells the rail, and nowhere else.
+#[test]
+fn start_is_offered_where_it_would_tell_the_rail() {
+    let robot = on_rail();
+    let lin = format!("LIN {}\n", krl_frame(&pose(&robot, 0.5), ""));
+    let sub = format!("sub()\nEND\nDEF sub()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{lin}");
+    let arm = format!("PTP {}\n", axes(""));
+    let elsewhere = format!("PTP {}\n", axes(",E1 700.0"));
+    for (body, helps) in [
+        (lin.clone(), true),
+        (format!("{arm}{lin}"), true),
+        (sub.clone(), true),
+        (format!("{elsewhere}{sub}"), false),
+        (format!("PICK()\n{sub}"), false),
+        (format!("PICK()\n{lin}"), false),
+        (format!("PTP XHOME\n{arm}{lin}"), false),
+        (format!("IF $IN[1] THEN\nPTP XHOME\nENDIF\n{arm}{lin}"), false),
+    ] {
+        let text = format!("{BEGIN}{body}END\n");
+        let all = words(&robot, "a.src", &text);
+        assert_eq!(all[&first_line(&text, "LIN ")].contains("--start"), helps, "{text}");
+    }
+}
+
+/// External axes of the point on a circle do not count: the rail goes on from where it stood before.
+#[test]
+fn the_end_of_a_circle_does_not_take_the_rail_from_the_point_on_it() {
+    let robot = on_rail();
+    let head = format!("PTP {}\n", axes(",E1 500.0"));
+    let at = |rail_m: f64, more: &str| krl_frame(&pose(&robot, rail_m), more);
+    let head_mod = format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget("500"));
+    let tool = |eax: &str| robtarget(&pose(&robot, 0.5), eax);
+    for (on_circle, end, is_left) in [("", "", false), (",E1 700.0", "", true), (",E1 700.0", ",E1 500.0", false)] {
+        let text = format!("{BEGIN}{head}CIRC {},{}\nEND\n", at(0.5, on_circle), at(0.5, end));
+        let left = read_program(&robot.0, &[1, 2, 3, 4, 5, 6, 0], "a.src", &text).left;
+        assert_eq!(left.iter().any(|l| l.why.reason == LeftReason::Incomplete), is_left, "{text}");
+        let [on_circle, end] = [on_circle, end].map(|e| if e.is_empty() { "9E9" } else { &e[4..7] });
+        let text = module(&format!("{head_mod}MoveC {},{},v10,fine,tool0;\n", tool(on_circle), tool(end)));
+        let left = read_program(&robot.0, &[1, 2, 3, 4, 5, 6, 0], "m.mod", &text).left;
+        assert_eq!(left.iter().any(|l| l.why.reason == LeftReason::Incomplete), is_left, "{text}");
+    }
+}
+
+/// A segment of a spline may leave external axes where they are best.
+#[test]
+fn a_segment_that_ignores_external_axes_is_left() {
+    let robot = on_rail();
+    let head = format!("PTP {}\n", axes(",E1 500.0"));
+    let at = |more: &str| krl_frame(&pose(&robot, 0.5), more);
+    let text = format!(
+        "{BEGIN}{head}SPLINE\nSLIN {} WITH $EX_AX_IGNORE='B1'\nSPL {}\nENDSPLINE\nEND\n",
+        at(",E1 700.0"),
+        at("")
+    );
+    let found = corrected(&robot, "a.src", &text, Some(0.5));
+    assert_eq!(found[&first_line(&text, "SLIN")], Err(LeftReason::ExternalAxis), "{text}");
+    assert_eq!(found[&first_line(&text, "SPL ")], Err(LeftReason::Incomplete), "{text}");
+}
+
+/// A trap routine, or an interrupt, that moves the robot may have moved the rail behind any statement.
+#[test]
+fn the_rail_may_stand_elsewhere_where_an_interrupt_moves_it() {
+    let robot = on_rail();
+    let head = format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget("500"));
+    let go = format!("MoveL {},v10,fine,tool0;\n", robtarget(&pose(&robot, 0.5), "9E9"));
+    let away = format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget("700"));
+    for (trap, counts) in [(String::from("TPWrite \"a\";\n"), true), (away, false), (String::from("rAway;\n"), false)] {
+        let text = module(&format!(
+            "CONNECT i1 WITH tAway;\n{head}WaitTime 1;\n{go}ENDPROC\nTRAP tAway\n{trap}ENDTRAP\nPROC p()\n"
+        ));
+        assert_eq!(is_met(&robot, "m.mod", &text), counts, "{text}");
     }
 }
 
@@ -190,7 +404,15 @@ fn a_rail_that_something_else_has_moved_stands_where_the_text_does_not_tell() {
         }
     }
     let all_told = go("560,0,0,0,0,0").replace(",9E9,9E9,9E9,9E9,9E9]", "]");
-    for (reset, is_met) in [("IndReset STN1,1;\n", true), ("", false)] {
+    for (reset, is_met) in [
+        ("IndReset STN1,1;\n", true),
+        ("", false),
+        ("IndReset STN1,2;\n", false),
+        ("IndReset STN2,1;\n", false),
+        ("IndReset STN1 , 1 \\RefNum:=0;\n", true),
+        ("IndAMove STN1,2\\ToAbsNum:=5,20;\nIndReset STN1,1;\n", false),
+        ("IndRMove STN2,1\\ToRelNum:=5,20;\nIndReset STN1,1;\nIndReset STN2,1;\n", true),
+    ] {
         let text = module(&format!("{head}IndAMove STN1,1\\ToAbsNum:=560,20;\n{reset}{all_told}"));
         let (line, found) = (first_line(&text, "MoveL"), corrected(&robot, "m.mod", &text, None));
         match is_met {

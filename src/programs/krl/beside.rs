@@ -95,8 +95,11 @@ impl Module<'_> {
                     // The event may come here.
                     let top = self.top_beside(std::slice::from_ref(&name));
                     self.flow.begins_beside(routine, &top);
-                    if let Some((behind, _)) = self.flow.behind(routine, &self.now) {
+                    if let Some((behind, stands)) = self.flow.behind(routine, &self.now) {
                         self.now.0 = self.now.0.merged(&behind, ANY_TIME);
+                        if stands != self.now.1 {
+                            self.way.may_go(&mut self.now.1);
+                        }
                     }
                 }
             }

@@ -86,7 +86,7 @@ impl Module<'_> {
             self.time_passes();
         } else if !is_still(&name) {
             self.way.may_go(&mut self.now.1);
-            self.may_carry();
+            self.goes_untold();
             self.is_given(reader, &name, open);
             self.time_passes();
         }

@@ -20,15 +20,26 @@ impl Module<'_> {
             (Ok((a, _)), _) | (Err(_), Value::Aggregate(a)) => Some(a.externals().collect()),
             (Err(_), _) => None,
         };
-        let Some(written) = written else { return self.may_carry() };
+        let Some(written) = written else { return self.goes_untold() };
         let mut off_zero = self.now.0.off_zero.value.clone();
         written.into_iter().for_each(|(axis, place)| off_zero.put(axis, place));
         self.axes_are(off_zero);
     }
 
     /// Behind something of which the text does not tell where it goes.
+    pub(super) fn goes_untold(&mut self) {
+        self.put_anywhere.note_untold();
+        self.may_carry();
+    }
+
+    /// Where the text does not tell from where the robot comes.
     pub(super) fn may_carry(&mut self) {
         self.axes_are(self.now.0.off_zero.value.either(&self.off_zero_anywhere));
+    }
+
+    /// Behind the auxiliary point of a circle: whether its external axes count, the text does not tell.
+    pub(super) fn may_stand_as(&mut self, before: &OffZero) {
+        self.axes_are(self.now.0.off_zero.value.either(before));
     }
 
     fn axes_are(&mut self, off_zero: OffZero) {

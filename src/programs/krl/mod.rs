@@ -113,6 +113,7 @@ fn reading(
         flow: Flow::new(known).among(&routines(files)?),
         motion_data: None,
         path_data: None,
+        put_anywhere: PutAnywhere::default(),
         off_zero_anywhere: OffZero::default(),
         spline: None,
         resumes: false,
@@ -122,19 +123,16 @@ fn reading(
         way: Itinerary::new(),
     };
     let mut references = References::default();
-    let mut put = PutAnywhere::default();
     for (index, file) in files.iter().enumerate() {
         module.assigned.look_through(reader(index, file)?, !has_moves(file));
-        off_zero::look_through(&mut put, reader(index, file)?);
+        off_zero::look_through(&mut module.put_anywhere, reader(index, file)?);
         if has_moves(file) {
             module.uses.look_through(reader(index, file)?);
             module.resumes |= calls::resumes(reader(index, file)?);
             calls::look_through(&mut references, reader(index, file)?);
         }
     }
-    module.off_zero_anywhere = put.off_zero();
-    let si = |reading: usize| if module.prismatic[reading] { 1e-3 } else { 1f64.to_radians() };
-    module.way.program.put = put.by_reading(setting.axes, si);
+    module.off_zero_anywhere = module.put_anywhere.off_zero();
     module.assigned.changed_by_calls(&references);
     // Data first: programs use them in whatever order the files are given.
     for wanted in [false, true] {
@@ -144,6 +142,8 @@ fn reading(
     }
     module.unvisited();
     module.given_away(|file| has_moves(&files[file]));
+    let si = |reading: usize| if module.prismatic[reading] { 1e-3 } else { 1f64.to_radians() };
+    module.way.program.put = module.put_anywhere.by_reading(setting.axes, si);
     Ok((module.way.finished(), module.flow.found()))
 }
 
@@ -174,6 +174,8 @@ struct Module<'a> {
     motion_data: Option<Option<Aggregate>>,
     /// Whether the tool keeps its orientation by the data of a path (`LDAT_ACT`); `None` where nothing stated them.
     path_data: Option<bool>,
+    /// Where the files put external axes.
+    put_anywhere: PutAnywhere,
     /// External axes that the files put elsewhere than at zero.
     off_zero_anywhere: OffZero,
     /// Frames of the spline block that is open.
@@ -213,10 +215,10 @@ impl Module<'_> {
             } else if moves && RELATIVE.contains(&word.as_str()) {
                 let why = Why::new(LeftReason::Relative, "it is relative to the position before");
                 self.leave_at(reader.index, reader.line(), &word, why);
-                self.may_carry();
+                self.goes_untold();
                 self.time_passes();
-            } else if moves && (off_zero::BESIDE.contains(&word.as_str()) || word == off_zero::ASYNCHRONOUS) {
-                self.may_carry();
+            } else if moves && off_zero::moves_beside(&word) {
+                self.goes_untold();
                 self.way.may_go(&mut self.now.1);
             } else if moves && is_beside(&reader) {
                 self.sets_beside(&mut reader);

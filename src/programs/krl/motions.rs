@@ -4,7 +4,7 @@ use super::aggregate::Aggregate;
 use super::assigned::matching;
 use super::frames::Frames;
 use super::moves::NULL_FRAME;
-use super::{Module, POSE_NAMES, Value};
+use super::{AXIS_NAMES, EXTERNAL_NAMES, Module, POSE_NAMES, Value};
 use crate::error::{Code, Error, Result};
 use crate::programs::program::{MeantPosture, Target, TargetKind, Understood};
 use crate::programs::reason::{LeftReason, Why};
@@ -14,6 +14,8 @@ use crate::programs::scan::Reader;
 const OF_JOINTS: [&str; 2] = ["PTP", "SPTP"];
 /// Variables of the controller that say where the robot stands.
 const STANDS: [&str; 2] = ["$AXIS_ACT", "$POS_ACT"];
+/// External axes that do not go where a segment of a spline says (KUKA, *Operating and programming instructions for system integrators*).
+const IGNORES_EXTERNAL: &str = "$EX_AX_IGNORE";
 /// Components of a pose; status and turn are those behind them.
 const COMPONENTS: usize = 6;
 
@@ -26,9 +28,10 @@ fn posture_of(motion: &str, stated: MeantPosture) -> MeantPosture {
     }
 }
 
-/// The first component that the end of a circle leaves out and its auxiliary point has.
-fn missing_at_end(auxiliary: &Aggregate, end: &Aggregate) -> Option<&'static str> {
-    POSE_NAMES.into_iter().take(COMPONENTS).find(|name| auxiliary.has(&[name]) && !end.has(&[name]))
+/// The first component, or one of so many external axes, that the end of a circle leaves out and its auxiliary point has.
+fn missing_at_end(auxiliary: &Aggregate, end: &Aggregate, external: usize) -> Option<&'static str> {
+    let external = EXTERNAL_NAMES.into_iter().take(external);
+    POSE_NAMES.into_iter().take(COMPONENTS).chain(external).find(|name| auxiliary.has(&[name]) && !end.has(&[name]))
 }
 
 /// A motion that is being read.
@@ -58,6 +61,14 @@ impl Module<'_> {
         reader.at = at;
         let keeps_orientation = own.keeps_orientation.unwrap_or(self.now.0.keeps_orientation.value);
         let motion = Motion { name, place, frames: own.over(&self.now.0), keeps_orientation };
+        let is_robot_alone = self.setting.axes_apart && self.setting.axes.len() == AXIS_NAMES.len();
+        if reader.rest_of_line_has(IGNORES_EXTERNAL) && !is_robot_alone {
+            let words = "external axes do not go where it says, or may not ($EX_AX_IGNORE)";
+            self.leave_at(place.0, place.1, name, Why::new(LeftReason::ExternalAxis, words));
+            self.goes_untold();
+            self.time_passes();
+            return Ok(());
+        }
         let mut auxiliary = None;
         for k in 0..count {
             if k > 0 && !reader.take_mark(b',') {
@@ -67,7 +78,11 @@ impl Module<'_> {
                 return motion.needs_target(reader, format!("{name} has no target"));
             }
             let value = self.value(reader)?;
+            let before = self.now.0.off_zero.value.clone();
             self.goes_to(&value, &motion, auxiliary.as_ref());
+            if k + 1 < count {
+                self.may_stand_as(&before);
+            }
             auxiliary = Some(value);
         }
         if reader.rest_of_line_has("CA") {
@@ -121,7 +136,7 @@ impl Module<'_> {
             _ => format!("{name} is a variable of the controller: what it holds, the text does not tell"),
         };
         self.leave_at(motion.place.0, motion.place.1, motion.name, Why::of(name, LeftReason::Undeclared, words));
-        self.may_carry();
+        self.goes_untold();
         self.way.lose(&mut self.now.1);
     }
 
@@ -147,7 +162,8 @@ impl Module<'_> {
         let (Ok((end, name)), Ok((auxiliary, _))) = (self.resolved(value), self.resolved(auxiliary)) else {
             return Ok(());
         };
-        let Some(missing) = missing_at_end(auxiliary, end) else { return Ok(()) };
+        let external = self.setting.axes.len().saturating_sub(AXIS_NAMES.len());
+        let Some(missing) = missing_at_end(auxiliary, end, external) else { return Ok(()) };
         let words = format!(
             "it leaves out {missing}, which its auxiliary point has: whether that or the start of the circle counts, is not known"
         );

@@ -4,11 +4,15 @@ use super::aggregate::external_axis;
 use crate::programs::external::PutAnywhere;
 use crate::programs::scan::{Reader, TokenKind};
 
-/// Statements that move external axes beside the program, or let others do so (KUKA, *Operating and programming instructions for system integrators*,
-/// asynchronous axes).
-pub(super) const BESIDE: [&str; 4] = ["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"];
-/// The axes that are moved so.
-pub(super) const ASYNCHRONOUS: &str = "$ASYNC_AXIS";
+/// A motion of external axes beside the program (KUKA, *Operating and programming instructions for system integrators*, asynchronous axes).
+const ASYNCHRONOUS: &str = "ASYPTP";
+/// What moves such axes to where no text tells, ends their motion under way, or lets others move them.
+const ANYWHERE: [&str; 5] = ["ASYCONT", "ASYSTOP", "ASYCANCEL", "$ASYNC_AXIS", "$ASYNC_EX_AX_DECOUPLE"];
+
+/// True for the first word of a statement that moves external axes beside the program, or lets others do so.
+pub(super) fn moves_beside(word: &str) -> bool {
+    word == ASYNCHRONOUS || ANYWHERE.contains(&word)
+}
 
 /// Notes the external axes that a text puts somewhere.
 pub(super) fn look_through(all: &mut PutAnywhere, mut reader: Reader<'_>) {
@@ -19,7 +23,8 @@ pub(super) fn look_through(all: &mut PutAnywhere, mut reader: Reader<'_>) {
             Some(TokenKind::Mark(b'}' | b')' | b']')) => _ = open.pop(),
             _ => {}
         }
-        let axis = reader.name().and_then(|name| external_axis(&name));
+        let name = reader.name().unwrap_or_default();
+        let axis = external_axis(&name);
         let is_element = [b'{', b',', b':'].iter().any(|mark| reader.ahead_is_mark(-1, *mark));
         let is_in_list = is_element && open.last() == Some(&b'{');
         let is_set = reader.ahead_is_mark(-1, b'.') && reader.ahead_is_mark(1, b'=') && !reader.ahead_is_mark(2, b'=');

@@ -27,6 +27,13 @@ impl Task<'_> {
         }
     }
 
+    /// True for some element of an array of which the text gives all: `name{}`.
+    pub(super) fn has_known_elements(&self, name: &str) -> bool {
+        let Some(array) = name.strip_suffix("{}") else { return false };
+        let mut elements = self.data.iter().filter(|(key, _)| array_of(key) == Some(array)).peekable();
+        elements.peek().is_some() && elements.all(|(_, datum)| datum.value.is_some())
+    }
+
     /// A move to some element of an array: to all of them, in an order that the text does not tell.
     pub(super) fn visit_any(
         &mut self,

@@ -18,19 +18,60 @@ const GUIDED: [&str; 2] = ["EGMRUNJOINT", "EGMRUNPOSE"];
 impl Task<'_> {
     /// Behind a move to a value.
     pub(super) fn carries(&mut self, value: &Node) {
-        let target = match value {
-            Node::List(_) => Some(value.clone()),
-            Node::Word(name) => self.declared(name).ok().map(|(target, _)| target),
-            Node::DisplacedTarget(displaced) => self.declared(&displaced.point).ok().map(|(target, _)| target),
-            _ => None,
-        };
-        let Some(places) = target.as_ref().and_then(places) else { return self.may_carry() };
+        if let Node::Word(name) = value
+            && self.has_known_elements(name)
+        {
+            return self.may_carry();
+        }
+        let Some(places) = self.places_of(value) else { return self.goes_untold() };
         let mut off_zero = self.switching.now().off_zero.value().clone();
         places.into_iter().for_each(|(axis, place)| off_zero.put(axis, place));
         self.switching.axes_are(off_zero);
     }
 
+    /// Where a target puts external axes, by their number from 0; `None` where the text does not tell.
+    fn places_of(&self, value: &Node) -> Option<Vec<(usize, Option<f64>)>> {
+        let declared = |name: &str| self.declared(name).ok().map(|(target, _)| target);
+        let target = match value {
+            Node::List(_) => value.clone(),
+            Node::Word(name) => declared(name)?,
+            Node::DisplacedTarget(displaced) => declared(&displaced.point)?,
+            _ => return None,
+        };
+        places(&target)
+    }
+
+    /// Behind the point on a circle: its external axes are not heeded (ABB, *Technical reference manual RAPID Instructions, Functions and Data types*,
+    /// `MoveC`).
+    pub(super) fn passes(&mut self, value: &Node) {
+        let before = self.switching.now().off_zero.value().clone();
+        self.carries(value);
+        let either = self.switching.now().off_zero.value().either(&before);
+        self.switching.axes_are(either);
+    }
+
+    /// Refuses the end of a circle that leaves out an axis of the description which the point on it has: that stands where it stood before that point.
+    pub(super) fn tells_axes_of(&self, end: &Node, on_circle: &Node) -> Understood<()> {
+        let known = self.setting.axes.len().saturating_sub(6);
+        let named = |value: &Node| self.places_of(value).unwrap_or_default().into_iter().map(|(axis, _)| axis);
+        let missing = named(on_circle).find(|axis| *axis < known && named(end).all(|told| told != *axis));
+        let why = missing.map(|axis| {
+            let axis = external_name(axis);
+            Why::new(
+                LeftReason::Incomplete,
+                format!("it leaves out {axis}, which the point on its circle has: write it"),
+            )
+        });
+        why.map_or(Ok(()), Err)
+    }
+
     /// Behind something of which the text does not tell where it goes.
+    pub(super) fn goes_untold(&mut self) {
+        self.switching.put_anywhere.note_untold();
+        self.may_carry();
+    }
+
+    /// Where the text does not tell from where the robot comes.
     pub(super) fn may_carry(&mut self) {
         let off_zero = self.switching.now().off_zero.value().either(&self.switching.off_zero_anywhere);
         self.switching.axes_are(off_zero);
@@ -42,7 +83,7 @@ impl Task<'_> {
         if self.switching.has_routine(word) || is_still(word) || is_set(reader) {
             return;
         }
-        self.may_carry();
+        self.goes_untold();
         match GUIDED.contains(&word) {
             true => self.way.lose(self.switching.stands()),
             false => self.way.may_go(self.switching.stands()),
@@ -65,7 +106,7 @@ impl Task<'_> {
         if self.setting.axes_apart && known == 0 {
             return Ok(());
         }
-        if *self.switching.now().independent.value() {
+        if !self.switching.now().independent.value().is_empty() {
             return left("an axis is moved independently of it (IndAMove, IndRMove, ..), or may be");
         }
         // Axis angles are those of the robot wherever an axis stands that the description lacks.

@@ -3,6 +3,7 @@
 mod array;
 mod calls;
 mod carried;
+mod cycle;
 mod frames;
 mod moves;
 mod off_zero;
@@ -109,13 +110,13 @@ fn reading(
         task.switching.look_through(reader(file)?);
     }
     task.changed_by_calls(&references);
-    task.way.program.put = task.switching.put_anywhere.by_reading(setting.axes, |reading| task.unit(reading).0);
     for file in files.iter().enumerate() {
         task.way.start_afresh();
         task.statements(reader(file)?)?;
         task.switching.all_end();
     }
     task.unvisited();
+    task.way.program.put = task.switching.put_anywhere.by_reading(setting.axes, |reading| task.unit(reading).0);
     Ok((task.way.finished(), task.switching.found()))
 }
 

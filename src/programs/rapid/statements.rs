@@ -43,6 +43,10 @@ pub(super) const CONTROL: [&str; 26] = [
 const LED: [&str; 2] = ["CORR", "TRACK"];
 /// The switch of a move to joints that no offset of external axes moves.
 const NO_OFFSET: &str = "NOEOFFS";
+/// Stands before and behind the name of a routine that is called by a text.
+const LATE: u8 = b'%';
+/// Targets of a move on a circle.
+const TWO_POINTS: usize = 2;
 /// Words between two operands.
 pub(super) const OPERATORS: [&str; 6] = ["AND", "OR", "XOR", "NOT", "DIV", "MOD"];
 
@@ -221,15 +225,20 @@ impl Task<'_> {
             if reader.ahead_is_mark(-1, b';') {
                 (0..std::mem::take(&mut conditions)).for_each(|_| self.switching.branches_end(&mut self.way));
             }
+            if reader.at >= begins && reader.is_mark(LATE) {
+                begins = statement_end(&mut reader);
+                self.late_call(&mut reader, begins)?;
+                continue;
+            }
             let Some(word) = reader.name() else {
                 reader.at += 1;
                 continue;
             };
             if reader.at < begins {
-                self.switching.within(&word, &mut self.way);
+                self.switching.within(&reader, &word, &mut self.way);
                 reader.at += 1;
             } else if let Some(targets) = self.move_to(&reader, &word) {
-                self.switching.before(&word);
+                self.switching.before(&word, &self.way);
                 self.instruction(&mut reader, targets)?;
                 reader.at += 1;
             } else if CONTROL.contains(&word.as_str()) {
@@ -246,7 +255,7 @@ impl Task<'_> {
                     self.switching.label(&mut self.way);
                 }
                 if !declares(&word) {
-                    self.switching.before(&word);
+                    self.switching.before(&word, &self.way);
                     self.no_move(&mut reader, &word, begins)?;
                 }
                 self.switching.statement(&reader, &word, &mut self.way);
@@ -256,12 +265,30 @@ impl Task<'_> {
         Ok(())
     }
 
+    /// `%"name"% argument, ..;`, a call of a routine by its name in a text, which may be computed; the reader stands on its beginning, and ends behind
+    /// the name.
+    fn late_call(&mut self, reader: &mut Reader<'_>, end: usize) -> Result<()> {
+        let behind = (reader.at + 1..end).find(|k| reader.token_is_mark(*k, LATE)).unwrap_or(reader.at);
+        let is_text = reader.ahead(1).filter(|t| t.kind == TokenKind::Text && behind == reader.at + 2);
+        let name = is_text.map(|t| String::from_utf8_lossy(reader.text(t)).trim_matches('"').to_ascii_uppercase());
+        reader.at = behind;
+        let word = name.clone().unwrap_or_else(|| char::from(LATE).to_string());
+        self.switching.before(&word, &self.way);
+        self.no_move(reader, &word, end)?;
+        self.switching.statement(reader, &word, &mut self.way);
+        if name.is_none() {
+            self.switching.runs_anything();
+        }
+        reader.at += 1;
+        Ok(())
+    }
+
     /// What a statement that is no known move says of positions.
     fn no_move(&mut self, reader: &mut Reader<'_>, word: &str, end: usize) -> Result<()> {
         if has_literal(reader, end)? {
             let words = format!("a position stands in it, and what {word} does with it is not known");
             self.leave((reader.index, reader.line()), word, Why::new(LeftReason::NotATarget, words));
-            self.may_carry();
+            self.goes_untold();
         }
         self.may_go(reader, word);
         let start = reader.at;
@@ -285,17 +312,21 @@ impl Task<'_> {
         plain.drain(..plain.len().min(targets.skipped));
         let count = targets.count.min(plain.len());
         let tool = self.tool_of(&plain, count);
-        for Argument { value, is_whole } in &plain[..count] {
-            let done = match is_whole {
-                true => self.visit(value, &name, (reader.index, line), &tool, work.as_ref())?,
-                false => Err(Why::computed()),
+        let on_circle = plain.first().filter(|_| count == TWO_POINTS).map(|argument| &argument.value);
+        for (k, Argument { value, is_whole }) in plain[..count].iter().enumerate() {
+            let is_told = on_circle.filter(|_| k > 0).map_or(Ok(()), |point| self.tells_axes_of(value, point));
+            let done = match (is_whole, is_told) {
+                (true, Ok(())) => self.visit(value, &name, (reader.index, line), &tool, work.as_ref())?,
+                (_, Err(why)) => Err(why),
+                (false, _) => Err(Why::computed()),
             };
             if let Err(why) = done {
                 self.leave((reader.index, line), &name, why);
             }
             match is_whole {
+                true if k + 1 < count => self.passes(value),
                 true => self.carries(value),
-                false => self.may_carry(),
+                false => self.goes_untold(),
             }
         }
         self.move_switches = MoveSwitches::default();

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::programs::external::OffZero;
 use crate::programs::flow::{Either, Followed, Held};
-use crate::programs::scan::Reader;
+use crate::programs::scan::{Reader, Token, TokenKind};
 
 /// Instructions that move all robtargets behind them, until `PDispOff`.
 pub(super) const DISPLACES: [&str; 2] = ["PDISPON", "PDISPSET"];
@@ -13,6 +13,8 @@ pub(super) const OFFSETS: [&str; 2] = ["EOFFSON", "EOFFSSET"];
 
 /// Instructions that move an axis independently of the targets, until `IndReset` (ABB, *Application manual Controller software*, Independent Axes).
 pub(super) const INDEPENDENT: [&str; 4] = ["INDAMOVE", "INDCMOVE", "INDDMOVE", "INDRMOVE"];
+/// Ends that of the axis which it names.
+pub(super) const INDEPENDENT_ENDS: &str = "INDRESET";
 
 /// Whether confdata count for a kind of move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,8 +104,8 @@ pub(super) struct Switched {
     pub offset: Switch<bool>,
     /// True where axis 4 may be locked, so that the tool turns as it can.
     pub locked: Switch<bool>,
-    /// True where an axis may be moved independently of the targets.
-    pub independent: Switch<bool>,
+    /// Axes that may be moved independently of the targets, as the instructions name them.
+    pub independent: Switch<BTreeSet<String>>,
     /// External axes that do not stand at zero.
     pub off_zero: Switch<OffZero>,
     /// Trap routines that an interrupt may run at any time.
@@ -112,14 +114,14 @@ pub(super) struct Switched {
 
 impl Switched {
     /// Where nothing has switched anything yet.
-    pub fn new(watched: [Watched; 2], [displaced, offset, locked, independent]: [bool; 4]) -> Self {
-        let [displaced, offset, locked, independent] = [displaced, offset, locked, independent].map(Switch::new);
+    pub fn new(watched: [Watched; 2], [displaced, offset, locked]: [bool; 3]) -> Self {
+        let [displaced, offset, locked] = [displaced, offset, locked].map(Switch::new);
         Self {
             watched: watched.map(Switch::new),
             displaced,
             offset,
             locked,
-            independent,
+            independent: Switch::new(BTreeSet::new()),
             off_zero: Switch::new(OffZero::default()),
             beside: Switch::new(BTreeSet::new()),
         }
@@ -198,6 +200,15 @@ impl Followed for Switched {
             beside: self.beside.behind_call(&end.beside),
         }
     }
+}
+
+/// The axis that an instruction names, on which the reader stands: `IndAMove UNIT,AXIS ..`, `IndReset UNIT,AXIS ..`.
+pub(super) fn named_axis(reader: &Reader<'_>) -> String {
+    let ends = |k: &usize| [b';', b'\\'].iter().any(|mark| reader.token_is_mark(*k, *mark));
+    let is_line_end = |t: &&Token| t.kind == TokenKind::LineEnd;
+    let words = (reader.at + 1..).take_while(|k| !ends(k)).map_while(|k| reader.token(k)).filter(|t| !is_line_end(t));
+    let text = words.map(|t| String::from_utf8_lossy(reader.text(t)).to_ascii_uppercase()).collect::<String>();
+    text.split(',').take(2).collect::<Vec<_>>().join(",")
 }
 
 /// `SingArea \LockAxis4`, `SingArea \Off`: true where axis 4 is locked; the reader stands on the name.

@@ -2,8 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use super::cycle::{AGAIN, Cycle};
 use super::off_zero::external_axes;
-use super::switched::{DISPLACES, INDEPENDENT, OFFSETS, Switched, Watched, locks, switch};
+use super::switched::{
+    DISPLACES, INDEPENDENT, INDEPENDENT_ENDS, OFFSETS, Switched, Watched, locks, named_axis, switch,
+};
 use crate::programs::external::{OffZero, PutAnywhere};
 use crate::programs::flow::{Branching, Flow, Followed, Places};
 use crate::programs::itinerary::{Itinerary, Stands};
@@ -58,8 +61,8 @@ pub(super) struct Switching {
     offsets: bool,
     /// True where a routine locks axis 4.
     locks: bool,
-    /// True where a routine moves axes independently of the targets.
-    independents: bool,
+    /// Axes that routines move independently of the targets.
+    independents: BTreeSet<String>,
     /// Where the texts put external axes.
     pub put_anywhere: PutAnywhere,
     /// External axes that the texts put elsewhere than at zero, at places that count as not known.
@@ -71,6 +74,7 @@ pub(super) struct Switching {
     top: Switched,
     /// What held where the handler of errors began that is being read: it is read as a routine of its own.
     handler: Option<Now>,
+    cycle: Cycle,
     /// True behind a statement of the routine that may fail.
     may_have_failed: bool,
     flow: Flow<Now>,
@@ -79,20 +83,21 @@ pub(super) struct Switching {
 impl Switching {
     /// With what the reading before found, and the routines of the files.
     pub fn new(known: Places<Now>, routines: &Routines) -> Self {
-        let top = Switched::new([Watched::On; 2], [false; 4]);
+        let top = Switched::new([Watched::On; 2], [false; 3]);
         let (now, flow) = ((top.clone(), Stands::default()), Flow::new(known).among(routines));
         Self {
             switched_off: [false; 2],
             displaces: false,
             offsets: false,
             locks: false,
-            independents: false,
+            independents: BTreeSet::new(),
             put_anywhere: PutAnywhere::default(),
             off_zero_anywhere: OffZero::default(),
             connected: BTreeSet::new(),
             now,
             top,
             handler: None,
+            cycle: Cycle::default(),
             may_have_failed: false,
             flow,
         }
@@ -148,9 +153,10 @@ impl Switching {
             self.displaces |= is_of(DISPLACES);
             self.offsets |= is_of(OFFSETS);
             self.locks |= locks(&reader) == Some(true);
+            let is_independent = name.as_ref().is_some_and(|word| INDEPENDENT.contains(&word.as_str()));
+            self.independents.extend(is_independent.then(|| named_axis(&reader)));
             external_axes(&mut self.put_anywhere, &mut reader);
-            if name.as_ref().is_some_and(|word| INDEPENDENT.contains(&word.as_str())) {
-                self.independents = true;
+            if is_independent {
                 self.put_anywhere.note_all();
             }
             connected(&reader).iter().for_each(|trap| self.connected.extend(self.flow.meant(trap)));
@@ -188,8 +194,10 @@ impl Switching {
                 self.flow.routine_begins(routine_name(reader), &mut self.now, &uncalled);
                 // Modules that are not given may call it, too.
                 self.now = self.now.merged(&uncalled, "");
-                if is_main && !self.flow.is_called(&routine_name(reader)) {
-                    self.now.1 = Stands::begin();
+                self.cycle.begins(is_main && !self.flow.is_called(&routine_name(reader)));
+                if self.cycle.is_main {
+                    let again = self.flow.passed(AGAIN).map(|(_, stands)| stands.merged(&Stands::begin(), ""));
+                    self.now.1 = again.unwrap_or_else(Stands::begin);
                 }
                 self.top = self.now.0.clone();
                 (self.handler, self.may_have_failed) = (None, false);
@@ -199,12 +207,19 @@ impl Switching {
                 }
             }
             "ENDPROC" | "ENDFUNC" | "ENDTRAP" => {
+                let is_endless = self.cycle.is_endless && self.handler.is_none();
                 self.part_ends();
+                if !is_endless {
+                    self.begins_again();
+                }
                 self.flow.routine_ends(&mut self.now);
             }
             "IF" => self.begin(Branching::If, way),
             "TEST" => self.begin(Branching::Cases, way),
-            "WHILE" | "FOR" => self.begin(Branching::Loop, way),
+            "WHILE" | "FOR" => {
+                self.cycle.loops(reader.ahead_is_word(1, "TRUE") && reader.ahead_is_word(2, "DO"));
+                self.begin(Branching::Loop, way);
+            }
             "ELSE" | "ELSEIF" | "CASE" | "DEFAULT" => {
                 way.next_branch();
                 self.flow.next(&mut self.now, matches!(word, "ELSE" | "DEFAULT"));
@@ -222,7 +237,7 @@ impl Switching {
                 }
             }
             "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => self.branches_end(way),
-            _ => self.step(word, way),
+            _ => self.step(reader, word, way),
         }
         self.top.note(&self.now.0);
     }
@@ -230,12 +245,13 @@ impl Switching {
     /// All that the routines of the files may have switched.
     fn anything(&self, is_displaced: bool) -> Switched {
         let state = |off: bool| if off { Watched::Unknown } else { Watched::On };
-        let on = [self.displaces, self.offsets, self.locks, self.independents].map(|on| on && is_displaced);
+        let on = [self.displaces, self.offsets, self.locks].map(|on| on && is_displaced);
         let mut any = Switched::new(self.switched_off.map(state), on);
         // What ran before may have left them anywhere.
         any.off_zero.begin(self.off_zero_anywhere.clone());
         if is_displaced {
             any.beside.begin(self.connected.clone());
+            any.independent.begin(self.independents.clone());
         }
         any
     }
@@ -253,7 +269,7 @@ impl Switching {
     }
 
     /// What interrupts and the handler of errors may have done before a statement, or a move, of this name.
-    pub fn before(&mut self, word: &str) {
+    pub fn before(&mut self, word: &str, way: &Itinerary) {
         self.goes_on_behind_failure();
         let may_fail = !SURE.contains(&word);
         if may_fail {
@@ -262,10 +278,19 @@ impl Switching {
         self.may_have_failed = may_fail;
         for trap in self.now.0.beside.value().clone() {
             self.flow.begins_beside(&trap, &self.now);
-            if let Some((behind, _)) = self.flow.behind(&trap, &self.now) {
+            if let Some((behind, stands)) = self.flow.behind(&trap, &self.now) {
                 self.now.0 = self.now.0.merged(&behind, "");
+                if stands != self.now.1 {
+                    way.may_go(&mut self.now.1);
+                }
             }
         }
+        self.top.note(&self.now.0);
+    }
+
+    /// A routine of which the text does not tell which: what any of the files switches may hold behind it.
+    pub fn runs_anything(&mut self) {
+        self.now.0 = self.now.0.merged(&self.anything(true), "");
         self.top.note(&self.now.0);
     }
 
@@ -295,35 +320,46 @@ impl Switching {
         let any = (self.anything(true), Stands::default());
         self.now = self.now.merged(&any, "");
         self.flow.arrives();
+        self.cycle.is_endless = false;
         way.lose(&mut self.now.1);
     }
 
     /// Behind a statement with branches, or a loop.
     pub fn branches_end(&mut self, way: &mut Itinerary) {
+        self.cycle.depth = self.cycle.depth.saturating_sub(1);
         self.next_begins();
         way.branches_end();
         self.flow.end(&mut self.now);
     }
 
     /// A word within a statement: what it names may take place.
-    pub fn within(&mut self, word: &str, way: &mut Itinerary) {
+    pub fn within(&mut self, reader: &Reader<'_>, word: &str, way: &mut Itinerary) {
         let before = self.now.clone();
-        self.step(word, way);
+        self.step(reader, word, way);
         self.now = self.now.merged(&before, "");
         self.top.note(&self.now.0);
     }
 
     /// A statement without branches.
-    fn step(&mut self, word: &str, way: &mut Itinerary) {
+    fn step(&mut self, reader: &Reader<'_>, word: &str, way: &mut Itinerary) {
         match word {
-            "RETURN" => self.flow.returns(&self.since_routine_began()),
+            "RETURN" => {
+                self.begins_again();
+                self.flow.returns(&self.since_routine_began());
+            }
+            "EXIT" if self.cycle.is_main => self.flow.goes_elsewhere(),
+            "EXITCYCLE" if self.cycle.is_main => {
+                self.begins_again();
+                self.flow.goes_elsewhere();
+            }
+            "EXITCYCLE" => self.flow.passes(AGAIN, &(self.now.0.clone(), Stands::unknown())),
             RETRY | TRY_NEXT if self.handler.is_some() => self.flow.part_ends(word, &self.now),
             "RAISE" if self.handler.is_some() => self.raises(),
             "GOTO" => self.flow.goes_elsewhere(),
             w if DISPLACES.contains(&w) => self.now.0.displaced.set(true),
             w if OFFSETS.contains(&w) => self.now.0.offset.set(true),
-            w if INDEPENDENT.contains(&w) => self.now.0.independent.set(true),
-            "INDRESET" => self.now.0.independent.set(false),
+            w if INDEPENDENT.contains(&w) => self.moves_independently(&named_axis(reader), true),
+            INDEPENDENT_ENDS => self.moves_independently(&named_axis(reader), false),
             "PDISPOFF" => self.now.0.displaced.set(false),
             "EOFFSOFF" => self.now.0.offset.set(false),
             _ => {
@@ -335,6 +371,16 @@ impl Switching {
         }
     }
 
+    /// One axis is moved independently of the targets, or no longer.
+    fn moves_independently(&mut self, axis: &str, is_moved: bool) {
+        let mut all = self.now.0.independent.value().clone();
+        match is_moved {
+            true => _ = all.insert(axis.to_owned()),
+            false => _ = all.remove(axis),
+        }
+        self.now.0.independent.set(all);
+    }
+
     /// A routine that a statement calls, and that fails, hands its error on to the handler of this one, which goes on so: with what held
     /// before the call, or with anything that the routine has switched.
     fn may_have_failed_within(&mut self, routine: &str, end: &str, before: &Now) {
@@ -342,7 +388,7 @@ impl Switching {
         {
             return;
         }
-        let nothing = (Switched::new([Watched::On; 2], [false; 4]), Stands::default());
+        let nothing = (Switched::new([Watched::On; 2], [false; 3]), Stands::default());
         if let Some((left, _)) = self.flow.behind(routine, &nothing) {
             self.now.0 = self.now.0.merged(&before.0, "");
             self.now.0.or_left_by(&left);
@@ -357,7 +403,15 @@ impl Switching {
         self.flow.goes_elsewhere();
     }
 
+    /// Behind the end of `main`, the program begins again with it.
+    fn begins_again(&mut self) {
+        if self.cycle.is_main && self.flow.is_reached() {
+            self.flow.passes(AGAIN, &self.since_routine_began());
+        }
+    }
+
     fn begin(&mut self, kind: Branching, way: &mut Itinerary) {
+        self.cycle.depth += 1;
         way.branches_begin();
         self.flow.begin(&mut self.now, kind);
     }
