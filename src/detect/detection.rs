@@ -1,6 +1,6 @@
 //! What a detector hands back for one image.
 
-use super::circles::{self, Drift, Ellipse, Found, InnerOuter, LOPSIDED_PX, Outcome};
+use super::circles::{self, Correlation, Drift, Ellipse, Found, InnerOuter, LOPSIDED_PX, Outcome};
 use crate::error::{Code, Error, Notice};
 use crate::series::Observation;
 
@@ -77,6 +77,8 @@ pub struct Circles {
     pub blur_px: f64,
     /// Noise of a pixel on paper and on ink, counts.
     pub noise: [f64; 2],
+    /// Of the noise of neighbouring pixels.
+    pub correlation: Correlation,
     /// Sizes that the plate does not state.
     pub sizes: Sizes,
 }
@@ -127,6 +129,7 @@ impl From<circles::CircleDetection> for Detection {
                 outcome: found.outcome,
                 blur_px: found.blur_px,
                 noise: found.noise,
+                correlation: found.correlation,
                 sizes: Sizes::default(),
             }),
             notices,

@@ -10,6 +10,7 @@
 mod boards;
 pub mod circles;
 mod corners;
+mod correlated;
 mod detection;
 mod dot_sizes;
 mod grey_levels;

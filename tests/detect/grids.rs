@@ -74,12 +74,17 @@ fn spoil(picture: Picture, spoiling: Spoiling) -> Picture {
     }
 }
 
-fn sharpen(picture: Picture, amount: f64, sigma: f64) -> Picture {
-    let to_image = |p: &Picture| {
-        image::ImageBuffer::<Luma<f32>, Vec<f32>>::from_raw(p.width as u32, p.height as u32, p.pixels.clone()).unwrap()
-    };
-    let blurred = image::imageops::blur(&to_image(&picture), sigma as f32);
-    let pairs = picture.pixels.iter().zip(blurred.as_raw());
+/// The picture after a Gaussian of this sigma, px.
+pub fn blurred(picture: &Picture, sigma: f64) -> Picture {
+    let size = (picture.width as u32, picture.height as u32);
+    let image = image::ImageBuffer::<Luma<f32>, _>::from_raw(size.0, size.1, picture.pixels.clone()).unwrap();
+    let pixels = image::imageops::blur(&image, sigma as f32).into_raw();
+    Picture { pixels, ..*picture }
+}
+
+pub fn sharpen(picture: Picture, amount: f64, sigma: f64) -> Picture {
+    let blurred = blurred(&picture, sigma);
+    let pairs = picture.pixels.iter().zip(&blurred.pixels);
     let pixels = pairs.map(|(v, b)| (v + amount as f32 * (v - b)).round().clamp(0.0, 255.0)).collect();
     Picture { pixels, ..picture }
 }

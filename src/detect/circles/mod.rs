@@ -23,6 +23,7 @@ mod smoothed;
 pub(crate) mod synth;
 mod types;
 
+pub use super::correlated::Correlation;
 pub(super) use candidates::contour::{Contour, Encloses, contours};
 pub(super) use candidates::levels::Levels;
 pub use drift::Drift;

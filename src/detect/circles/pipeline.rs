@@ -12,6 +12,7 @@ use super::identity::code::{MarkerCode, Verdict};
 use super::identity::lattice::{Apart, Buckets, Cell, Lattice, lattices};
 use super::identity::neighbour_check::{Board, Placed, around, check_neighbours, continuation, neighbourhood};
 use super::measuring::agreement::{Inner, Seen, agreement};
+use super::measuring::bands::Bands;
 use super::measuring::glare::allow_for_glare;
 use super::measuring::measure::{Camera, THRESHOLD, Target, drop_target, learn, target_of};
 use super::measuring::predicted::Predicted;
@@ -304,14 +305,20 @@ impl Work<'_> {
     ) -> Harvest {
         let guess = median(board.values().map(|p| self.candidates[p.candidate].blur_px)).unwrap_or(f64::NAN);
         let mut targets: Vec<Target> = board.iter().map(|(cell, p)| self.target(*cell, p, guess)).collect();
-        let camera = learn(self.picture, &mut targets, guess, levels.noise, &mut self.pixels);
+        let mut camera = learn(self.picture, &mut targets, guess, levels.noise, &mut self.pixels);
         let (mut entries, mut refused) = (Vec::new(), Vec::new());
+        let mut bands = Bands::of(targets.len());
         for (&cell, target) in board.keys().zip(targets) {
             match refine_steadily(self.picture, &target.start(&camera, 0.3), &mut self.pixels) {
-                Ok(fit) => entries.push(Entry { cell, fit, rescued: false }),
+                Ok(fit) => {
+                    bands.take(&fit, &self.pixels);
+                    entries.push(Entry { cell, fit, rescued: false });
+                }
                 Err(reason) => refused.push((cell, target, reason)),
             }
         }
+        camera.correlation = bands.correlation(self.picture);
+        bands.state(&camera.correlation, entries.iter_mut().map(|e: &mut Entry| &mut e.fit));
         if options.rescue {
             let rescued = self.rescue(board, &camera, dropped);
             entries.extend(rescued);
@@ -453,6 +460,7 @@ impl Work<'_> {
             outcome,
             blur_px,
             noise,
+            correlation: harvest.camera.correlation,
             inner_outer: harvest.inner_outer,
             lopsided,
             smoothed: 0,

@@ -5,6 +5,7 @@ use std::fmt;
 
 use super::drift::Drift;
 use super::ellipse::Ellipse;
+use crate::detect::correlated::Correlation;
 use crate::error::{Code, Notice};
 use crate::series::{Edge, Observation};
 
@@ -257,6 +258,8 @@ pub struct CircleDetection {
     pub blur_px: f64,
     /// Noise of a pixel on paper and on ink, counts.
     pub noise: [f64; 2],
+    /// Of the noise of neighbouring pixels.
+    pub correlation: Correlation,
     /// Mean difference inner - outer centre that geometry does not explain, with its standard error, px;
     /// coma of the lens or motion with a changing speed shows here.
     pub inner_outer: Option<InnerOuter>,
@@ -318,7 +321,7 @@ impl CircleDetection {
             lost.get(&f.marker).is_some_and(|uv| (uv[0] - centre[0]).hypot(uv[1] - centre[1]) < SAME_PLACE_PX)
         };
         if self.found.is_empty() {
-            (self.blur_px, self.noise) = (smoothed.blur_px, smoothed.noise);
+            (self.blur_px, self.noise, self.correlation) = (smoothed.blur_px, smoothed.noise, smoothed.correlation);
         }
         let before = self.found.len();
         self.found.extend(smoothed.found.into_iter().filter(is_lost));

@@ -7,10 +7,8 @@ mod model;
 mod neighbours;
 mod noise;
 mod outline;
-mod raster;
 mod refusal;
 mod rim;
-mod small_windows;
 mod smooth;
 mod sums;
 
@@ -22,11 +20,12 @@ use lattice::{Lattice, Placement};
 use look::Sight;
 pub(super) use look::quantile;
 use neighbours::{FAR_REACH, REACH, seed};
-use noise::Correlation;
+use noise::{correlation, covariance};
 use outline::outline;
 use refusal::Refusal;
 use rim::out_of_line;
 
+use super::correlated::Correlation;
 use super::{Detection, Dropped, Picture};
 use crate::linalg::median;
 use crate::series::{Edge, Observation};
@@ -72,12 +71,12 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
     }
     detection.outline = outline(picture, &kept, placement);
     let correlation = match view.has_correlated_noise() {
-        true => Correlation::of(&some(&kept), view.smoothing_px()),
+        true => correlation(&some(&kept), view.smoothing_px()),
         false => Correlation::WHITE,
     };
     for (key, saddle) in kept {
         if let Some(marker) = placement.id(key) {
-            let covariance = Some(correlation.covariance(&saddle));
+            let covariance = Some(covariance(&correlation, &saddle));
             detection.observations.push(Observation { marker, edge: Edge::Outer, uv: saddle.uv, covariance });
         }
     }

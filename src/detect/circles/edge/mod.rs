@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! state (the parameters) -> exact, flat_zone, nearby_ink, gauss (what makes up a pixel) -> model (pixels and derivatives)
-//!     -> squares (how well it fits); start, prior and normal (what is known beforehand) -> descent (the steps) -> refine (least squares)
+//!     -> squares (how well it fits); start, prior and normal (what is known beforehand) -> descent (the steps)
+//!     -> solved (a fit that has ended) -> noise (covariance under noise in common) -> refine (least squares)
 //! ```
 
 mod descent;
@@ -11,9 +12,11 @@ mod flat_zone;
 pub(super) mod gauss;
 pub(super) mod model;
 pub(super) mod nearby_ink;
+pub(super) mod noise;
 mod normal;
 mod prior;
 pub(super) mod refine;
+mod solved;
 mod squares;
 pub(super) mod start;
 mod state;

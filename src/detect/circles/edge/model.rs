@@ -22,6 +22,7 @@
 use super::exact::{Contour, MOMENTS, Nodes};
 use super::flat_zone::Flat;
 use super::gauss::{LANES, normal_tail};
+use super::solved::Solved;
 use super::state::{ANNULUS, CENTRE, INNER, LN_BLUR, LN_RATIO, SHAPE, State, THIRD, WHITE};
 use crate::linalg::wide;
 
@@ -52,6 +53,8 @@ pub struct Pixels {
     pub nodes: Nodes,
     /// Even paper and ink beyond the band.
     pub flat: Flat,
+    /// The last fit that ended on them.
+    pub solved: Option<Solved>,
 }
 
 /// What lopsided edges leave in the residuals, along both axes ([`Pixels::skew`]).
@@ -107,6 +110,7 @@ impl Pixels {
         self.y.clear();
         self.value.clear();
         self.count = 0;
+        self.solved = None;
     }
 
     /// Adds neighbouring pixels of a row, the first of them at `x`.
@@ -114,6 +118,31 @@ impl Pixels {
         self.x.extend((0..values.len()).map(|k| x + k as f32));
         self.y.resize(self.x.len(), y);
         self.value.extend_from_slice(values);
+    }
+
+    /// Column and row of every pixel.
+    pub fn places(&self) -> Vec<[i32; 2]> {
+        self.x.iter().zip(&self.y).take(self.count).map(|(x, y)| [x.round() as i32, y.round() as i32]).collect()
+    }
+
+    /// Weighted derivatives of the pixels by a parameter.
+    pub fn column(&self, parameter: usize) -> Vec<f64> {
+        self.columns[parameter][..self.count].iter().map(|v| f64::from(*v)).collect()
+    }
+
+    /// The same by several parameters, summed up by these weights.
+    pub fn combination(&self, weights: &[f64]) -> Vec<f32> {
+        let mut sum = vec![0.0; self.x.len()];
+        wide(
+            #[inline(always)]
+            || {
+                for (column, weight) in self.columns.iter().zip(weights) {
+                    let weight = *weight as f32;
+                    sum.iter_mut().zip(column).for_each(|(s, v)| *s += weight * v);
+                }
+            },
+        );
+        sum
     }
 
     /// Keeps the first `count` pixels.

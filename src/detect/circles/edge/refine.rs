@@ -4,14 +4,17 @@ use super::descent::iterate;
 use super::flat_zone::{Flat, Zone};
 use super::model::{Lopsided, Pixels};
 use super::nearby_ink::lift;
+use super::noise::OfCentres;
 use super::normal::{Normal, solve};
 use super::prior::Prior;
+use super::solved::Solved;
 use super::squares::Squares;
 use super::start::{Descent, Start};
 use super::state::{ANNULUS, DARK, DISC, INNER, State};
 use crate::detect::Picture;
 use crate::detect::circles::ellipse::Ellipse;
 use crate::detect::circles::types::{Imaged, Measured, Reason};
+use crate::detect::correlated::Correlation;
 use crate::detect::shared::{GLARE_SLOPE, SATURATED};
 use crate::series::Edge;
 
@@ -32,6 +35,14 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// States the covariance of the centres anew, for noise of this correlation.
+    pub fn state(&mut self, of: &OfCentres, correlation: &Correlation) {
+        let covariance = Covariance { columns: of.covariance(correlation).into() };
+        self.measured.outer.covariance = covariance.block(0);
+        self.measured.inner.iter_mut().for_each(|inner| inner.covariance = covariance.block(2));
+        self.cross = covariance.cross();
+    }
+
     /// Standard deviation of the distance of inner and outer centre, px (the larger of both axes); infinite where the
     /// inner circle is not measured for itself.
     pub fn apart_sigma(&self) -> f64 {
@@ -81,7 +92,8 @@ pub fn refine(picture: &Picture, start: &Start, pixels: &mut Pixels) -> Result<F
     let is_in_glare = |Fit { ink_slope: ([x, y], _), measured: Measured { gradient: [u, v], .. }, .. }: &Fit| {
         (x - u).hypot(y - v) < ADDED * u.hypot(*v)
     };
-    Ok(free.ok().filter(is_in_glare).unwrap_or(fit))
+    // Without glare the fit is made once more, for what it leaves in `pixels`.
+    free.ok().filter(is_in_glare).map_or_else(|| measure(picture, start, pixels), Ok)
 }
 
 fn measure(picture: &Picture, start: &Start, pixels: &mut Pixels) -> Result<Fit, Reason> {
@@ -178,7 +190,12 @@ fn finish(
         (even[0] + left.off_edge[0].0, pixels.flat.paper.count + left.off_edge[0].1),
         (even[1] + left.off_edge[1].0, pixels.flat.ink.count + left.off_edge[1].1),
     ];
-    let covariance = Covariance::of(factor, parameters, scale);
+    let solved = Solved { state: *state, factor: *factor, noise: start.noise, scale };
+    let covariance = match start.correlation == Correlation::WHITE {
+        true => Covariance::of(factor, parameters, scale),
+        false => Covariance { columns: OfCentres::of(&solved, pixels).covariance(&start.correlation).into() },
+    };
+    pixels.solved = Some(solved);
     let place = |e: Ellipse| Ellipse { centre: [0, 1].map(|a| e.centre[a] + anchor[a]), ..e };
     let outer = Imaged { edge: Edge::Outer, ellipse: place(state.ellipse()), covariance: covariance.block(0) };
     let hole = state.inner_ellipse().map(place);
@@ -236,6 +253,7 @@ struct Covariance {
 }
 
 impl Covariance {
+    /// For white noise.
     fn of(factor: &Normal, parameters: usize, scale: f64) -> Self {
         let rows = [0, 1, INNER, INNER + 1];
         let used = if parameters == ANNULUS { 4 } else { 2 };

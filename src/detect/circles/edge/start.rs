@@ -2,6 +2,7 @@
 
 use super::nearby_ink::NearbyInk;
 use crate::detect::circles::ellipse::Ellipse;
+use crate::detect::correlated::Correlation;
 
 /// Where to start and what to assume.
 #[derive(Debug, Clone, Copy)]
@@ -20,6 +21,8 @@ pub struct Start<'a> {
     pub clear: f64,
     /// Variance of a pixel on paper and on ink, counts^2.
     pub noise: [f64; 2],
+    /// Of the noise of neighbouring pixels.
+    pub correlation: Correlation,
     /// Prior sigma of the ink's own gradient as a share of the contrast, 1/px.
     pub ink_slope: f64,
     /// Centre of the inner circle less that of the outer one, px.

@@ -1,5 +1,6 @@
 //! Measuring markers whose place is known: all candidates of a picture, or those that someone predicts.
 
+use super::bands::Bands;
 use crate::detect::Picture;
 use crate::detect::circles::candidates::candidate::{Candidate, candidates, largest_marker};
 use crate::detect::circles::candidates::levels::Levels;
@@ -9,6 +10,7 @@ use crate::detect::circles::edge::start::{Descent, Start};
 use crate::detect::circles::ellipse::Ellipse;
 use crate::detect::circles::identity::lattice::Buckets;
 use crate::detect::circles::types::{DroppedCandidate, Measured, Options, Reason};
+use crate::detect::correlated::Correlation;
 use crate::linalg::median;
 
 /// Threshold between the envelopes: a little above the middle, where small blurred markers keep their size.
@@ -20,6 +22,8 @@ pub struct Camera {
     pub blur_px: f64,
     /// Variance of a pixel on paper and on ink, counts^2.
     pub noise: [f64; 2],
+    /// Of the noise of neighbouring pixels.
+    pub correlation: Correlation,
     /// Typical gradient of the ink beyond its share of the paper's, as a part of the contrast, 1/px.
     pub ink_slope: f64,
 }
@@ -52,6 +56,7 @@ impl Target {
             shape_sigma: self.shape_sigma,
             clear: self.clear,
             noise: camera.noise,
+            correlation: camera.correlation,
             ink_slope: camera.ink_slope,
             apart: [0.0; 2],
             third: None,
@@ -68,7 +73,8 @@ const LEARNERS: usize = 24;
 /// Learns blur and noise from some of the targets, and how far contours lie beside the edges: all of them are moved there.
 pub fn learn(picture: &Picture, targets: &mut [Target], guess_blur: f64, noise: f32, pixels: &mut Pixels) -> Camera {
     let variance = f64::from(noise).powi(2);
-    let mut camera = Camera { blur_px: guess_blur, noise: [variance; 2], ink_slope: INK_SLOPE };
+    let (noise, correlation) = ([variance; 2], Correlation::WHITE);
+    let mut camera = Camera { blur_px: guess_blur, noise, correlation, ink_slope: INK_SLOPE };
     let mut beside_px = 0.0;
     for _ in 0..2 {
         camera.ink_slope = INK_SLOPE;
@@ -89,7 +95,7 @@ pub fn learn(picture: &Picture, targets: &mut [Target], guess_blur: f64, noise: 
         beside_px = beside;
         let settled = (blur / camera.blur_px).ln().abs() < 0.15;
         let noise = [0, 1].map(|side| plain_variance(&fits, side).unwrap_or(variance));
-        camera = Camera { blur_px: blur, noise, ink_slope: ink_slope(&fits) };
+        camera = Camera { blur_px: blur, noise, correlation, ink_slope: ink_slope(&fits) };
         if settled {
             break;
         }
@@ -134,14 +140,18 @@ pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Drop
     let mut pixels = Pixels::default();
     let guess = median(candidates.iter().map(|c| c.blur_px)).unwrap_or(f64::NAN);
     let camera = learn(picture, &mut targets, guess, levels.noise, &mut pixels);
-    let mut measured = Vec::new();
+    let (mut fits, mut bands) = (Vec::new(), Bands::of(targets.len()));
     for target in &targets {
         match refine(picture, &target.start(&camera, 0.3), &mut pixels) {
-            Ok(fit) => measured.push(fit.measured),
+            Ok(fit) => {
+                bands.take(&fit, &pixels);
+                fits.push(fit);
+            }
             Err(reason) => dropped.push(drop_target(target, reason, None)),
         }
     }
-    (measured, dropped)
+    bands.state(&bands.correlation(picture), fits.iter_mut());
+    (fits.iter().map(|fit| fit.measured).collect(), dropped)
 }
 
 /// Relative radius around a candidate out to which there is no other, with room for the blur of its edge.

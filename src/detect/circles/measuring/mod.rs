@@ -1,11 +1,12 @@
 //! All markers of a picture measured, and what is believed of that.
 //!
 //! ```text
-//! measure (candidates) -> rescue (small ones, by what neighbours tell) -> agreement (inner and outer circle), glare
+//! measure (candidates) -> bands (noise of neighbouring pixels) -> rescue (small ones, by what neighbours tell) -> agreement (inner and outer circle), glare
 //! predicted, overlapping -> predicted_pass (the second pass: where camera and pose say that they are)
 //! ```
 
 pub(super) mod agreement;
+pub(super) mod bands;
 pub(super) mod glare;
 pub(super) mod measure;
 mod overlapping;

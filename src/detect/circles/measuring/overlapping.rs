@@ -14,6 +14,7 @@ use crate::detect::circles::edge::model::Pixels;
 use crate::detect::circles::edge::nearby_ink::NearbyInk;
 use crate::detect::circles::edge::refine::Fit;
 use crate::detect::circles::types::Measured;
+use crate::detect::correlated::Correlation;
 use crate::linalg::median;
 
 /// Most rounds, and the movement of the centres from one to the next at which they rest, px.
@@ -40,7 +41,8 @@ pub(super) fn measure_beside(
 /// The same in a picture of which nothing is known: blur and the evenness of the ink are learned from the markers, too.
 pub(super) fn measure_alone(picture: &Picture, predicted: &[Predicted]) -> Vec<Option<Fit>> {
     let variance = f64::from(noise_of(picture)).powi(2);
-    let camera = Camera { blur_px: USUAL_BLUR_PX, noise: [variance; 2], ink_slope: INK_SLOPE };
+    let camera =
+        Camera { blur_px: USUAL_BLUR_PX, noise: [variance; 2], correlation: Correlation::WHITE, ink_slope: INK_SLOPE };
     let mut first = Overlapping::of(picture, camera, SMALLEST_PX[1], &[], predicted);
     first.settle(true);
     let fits: Vec<Fit> = first.fits.iter().flatten().copied().collect();

@@ -11,11 +11,13 @@ use crate::detect::{Circles, Detection, Picture};
 /// Markers across the border of the picture are measured from the part that is in it; those with neighbours within the reach
 /// of the blur together with them.
 pub fn detect_predicted(picture: &Picture, detection: &mut Detection, predicted: &[Predicted]) {
-    let Detection { observations, dropped, circles: Some(Circles { found, blur_px, noise, .. }), .. } = detection
+    let Detection { observations, dropped, circles: Some(Circles { found, blur_px, noise, correlation, .. }), .. } =
+        detection
     else {
         return;
     };
-    let camera = Camera { blur_px: *blur_px, noise: noise.map(|n| n * n), ink_slope: INK_SLOPE };
+    let camera =
+        Camera { blur_px: *blur_px, noise: noise.map(|n| n * n), correlation: *correlation, ink_slope: INK_SLOPE };
     let is_known = |p: &&Predicted| found.iter().any(|f| f.marker == p.marker);
     let missing: Vec<Predicted> = predicted.iter().filter(|p| !is_known(p)).copied().collect();
     let known: Vec<Measured> = found.iter().map(|f| f.measured).collect();

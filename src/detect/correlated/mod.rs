@@ -1,0 +1,16 @@
+//! Noise that neighbouring pixels have in common, told by what a fit of edges leaves: sharpening, smoothing, compression, demosaicing.
+//!
+//! ```text
+//! residuals (what a fit left, and the odd part of it) -> response (what noise would leave it) -> correlation (of noise by lag, and what it
+//!     makes of a covariance); raster: pixels two by two
+//! ```
+
+mod correlation;
+mod raster;
+mod residuals;
+mod response;
+
+pub use correlation::Correlation;
+pub(super) use correlation::sound;
+pub(super) use raster::{LAGS, NONE, Raster};
+pub(super) use residuals::{OddPart, Residuals, Seen};
