@@ -182,7 +182,7 @@ pub struct FoundModel {
     pub layout: Layout,
     /// What stands still in the base frame for the first image on the robot, and its first column.
     pub still: Option<(Pose, usize)>,
-    /// Covariance of the columns of `layout`, m and rad; of a plate that is fitted bent its frame is, by the mean of the bow, another than that of `still`.
+    /// Covariance of the columns of `layout`, m and rad, with the plates in the frames of their nominal markers, as `still` is.
     pub covariance: DMatrix<f64>,
     /// Stops of the images in use.
     pub stops: Vec<Posture>,
