@@ -90,6 +90,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("frames/plan.rs GAIN", "convergence"),
     ("frames/plan.rs SEED", "start of random numbers"),
     ("frames/robot.rs ROUNDING", "rounding of an eigenvalue"),
+    ("frames/touch.rs AT_MARKER_M", "what a file rounds"),
     ("identify/two_stage/compare.rs MANY_STOPS", "where some stops do"),
     ("identify/two_stage/compare.rs MOST_TOGETHER", "saves time"),
     ("identify/two_stage/compare.rs SOME_STOPS", "samples of a ratio"),
