@@ -8,7 +8,7 @@ use crate::fit::Fit;
 use crate::geom::{adjoint, rigid_fit};
 use crate::linalg::SymmetricFactor;
 use crate::problem::Step;
-use crate::solve::{LinearImage, SeenMarkers};
+use crate::solve::{InFrame, LinearImage, SeenMarkers};
 
 /// Share of what the poses tell of the common frames that holds what they do not.
 const HELD: f64 = 1e-9;
@@ -45,11 +45,14 @@ pub(super) struct Effects<'a> {
 }
 
 impl<'a> Effects<'a> {
-    pub fn of(fit: &'a Fit, limits: &Limits) -> Self {
+    /// `framed` is what is stated with the plates in their frames: a step is measured from these, and the tolerance of the markers leaves the frame
+    /// of the fit open. Without it the covariance of the fit counts.
+    pub fn of(fit: &'a Fit, framed: Option<&InFrame>, stated: &'a DMatrix<f64>, limits: &Limits) -> Self {
         let linear = fit.linear();
+        let of_poses = framed.map_or_else(|| fit.covariance.camera_poses(linear), |framed| framed.camera_poses(linear));
         let mut variances = [0.0f64; 2];
         let mut adjoints = Vec::with_capacity(linear.images().len());
-        for (own, covariance) in linear.images().zip(fit.covariance.camera_poses(linear)) {
+        for (own, covariance) in linear.images().zip(of_poses) {
             let ad = adjoint(&own.chain.pose);
             let covariance = ad * covariance * ad.transpose();
             for (part, sum) in variances.iter_mut().enumerate() {
@@ -59,7 +62,7 @@ impl<'a> Effects<'a> {
         }
         let count = adjoints.len().max(1) as f64;
         let sigmas = variances.map(|sum| (sum / count).sqrt());
-        let model = FlangeModel::of(fit, &fit.covariance.reduced, limits).and_then(|model| {
+        let model = FlangeModel::of(fit, stated, limits).and_then(|model| {
             // The optical frame of a fixed camera turns with its principal point, and what it sees stays where it is.
             if model.is_relative_to_a_camera() { model.with_fitted_base(&stops(&fit.problem)) } else { Some(model) }
         });

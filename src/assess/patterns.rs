@@ -14,7 +14,7 @@ use crate::fit::Fit;
 use crate::linalg::symmetric_eigen;
 use crate::model::camera::Lens;
 use crate::problem::{Adjustment, Equations, PlateShape, Step};
-use crate::solve::{LinearImage, Response, Singular};
+use crate::solve::{LinearImage, Response, Singular, in_frame};
 
 /// Share of the information of a scaled direction below which the fit absorbs it.
 const ABSORBED: f64 = 1e-8;
@@ -145,7 +145,9 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
     }
     let groups = groups(fit);
     let response = response(fit, &groups)?;
-    let effects = Effects::of(fit, limits);
+    let framed = in_frame(linear, &fit.covariance).ok();
+    let stated = framed.as_ref().map(|framed| framed.dense(fit.problem.layout.len()));
+    let effects = Effects::of(fit, framed.as_ref(), stated.as_ref().unwrap_or(&fit.covariance.reduced), limits);
     let (n, squares) = (response.equations as f64, response.squares);
     let points: usize = linear.images().map(|i| i.terms.residuals.len()).sum();
     let sum: f64 = linear.images().flat_map(|i| i.terms.residuals.iter()).map(|r| r.duv.norm_squared()).sum();

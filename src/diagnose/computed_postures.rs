@@ -17,6 +17,8 @@ pub struct ComputedPostures {
     pub others: Vec<String>,
     /// True where other postures at many stops together fit as well.
     pub is_open: bool,
+    /// Stops at which another posture fits as well, the others as they are.
+    pub undecided: usize,
 }
 
 impl Kind for ComputedPostures {
@@ -39,6 +41,7 @@ impl Kind for ComputedPostures {
             count("stops", self.stops),
             count("in_another_posture", self.others.len()),
             count("others_fit_as_well", usize::from(self.is_open)),
+            count("undecided", self.undecided),
         ]
     }
 
@@ -61,7 +64,11 @@ impl Kind for ComputedPostures {
             }
             false => "",
         };
-        format!("{others}{open}")
+        let undecided = match self.undecided {
+            0 => String::new(),
+            count => format!("; at {count} of {} stops another posture fits as well by itself", self.stops),
+        };
+        format!("{others}{undecided}{open}")
     }
 
     fn remedy(&self) -> String {

@@ -7,6 +7,18 @@ use crate::geom::Pose;
 use crate::model::robot::Posture;
 use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries, intern, stop_name};
 
+/// A place is that of a marker from which it is no farther, m: what a file rounds.
+const AT_MARKER_M: f64 = 1e-5;
+
+/// A marker of a plate in the frame of the plate, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TouchedMarker {
+    /// Where its plate says that it is.
+    pub nominal: Vector3<f64>,
+    /// Where the images found it.
+    pub found: Vector3<f64>,
+}
+
 /// Where a touch says that the body was.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Seen {
@@ -113,6 +125,21 @@ impl Touches {
         for posture in &mut self.postures {
             posture.readings.iter_mut().zip(offsets).for_each(|(reading, offset)| *reading += offset);
         }
+    }
+
+    /// Brings touches at the nominal places of markers to where the markers were found; how far each, m.
+    pub fn move_to_found(&mut self, markers: &[TouchedMarker]) -> Vec<f64> {
+        let mut moved = Vec::new();
+        for touch in &mut self.all {
+            let Seen::Point(place) = &mut touch.seen else { continue };
+            let away = |m: &&TouchedMarker| (m.nominal - *place).norm();
+            let nearest = markers.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+            if let Some(marker) = nearest.filter(|m| away(m) <= AT_MARKER_M) {
+                moved.push((marker.found - marker.nominal).norm());
+                *place = marker.found;
+            }
+        }
+        moved
     }
 
     /// True where the orientation of a body was seen, too.

@@ -831,3 +831,33 @@ fn touches_of_the_plate_are_judged_by_where_the_tool_is_on_it() {
     assert!(in_the_base > 1e-3, "{in_the_base}");
     assert!(record.expected.with_frames_m < 2e-4, "{:?}", record.expected);
 }
+
+/// A plate that was printed badly: touches of its markers are stated at the nominal places, and the solution knows where they are.
+#[test]
+fn touches_at_nominal_places_of_markers_are_taken_where_these_were_found() {
+    let truth = Truth::read(&repo("datasets/kr6_small/truth.toml")).unwrap();
+    let Files { folder, touches, .. } = files("plate", truth.plate_poses["placement_0"].pose(), 14);
+    let mut solution: serde_json::Value = serde_json::from_slice(&std::fs::read(repo(SOLUTION)).unwrap()).unwrap();
+    let mut reader = csv::Reader::from_path(touches.join("contacts.csv")).unwrap();
+    let mut rng = rng(15);
+    let mut stated = String::from("stop,contact,x_m,y_m,z_m\n");
+    for (k, row) in reader.records().map(Result::unwrap).enumerate() {
+        let found: Vec<f64> = (2..5).map(|c| row[c].parse().unwrap()).collect();
+        let off = spread(&[(-0.4e-3, 0.4e-3); 3], 1, &mut rng).remove(0);
+        let nominal: Vec<f64> =
+            found.iter().zip(&off).map(|(place, off)| ((place + off) * 1e6).round() * 1e-6).collect();
+        stated += &format!("{},{},{:.6},{:.6},{:.6}\n", &row[0], &row[1], nominal[0], nominal[1], nominal[2]);
+        let plate = &mut solution["plates"][0];
+        plate["nominal_m"][k] = nominal.into();
+        plate["position_m"][k] = found.into();
+    }
+    let from = folder.path().join("solution.json");
+    std::fs::write(&from, serde_json::to_vec(&solution).unwrap()).unwrap();
+    std::fs::write(touches.join("contacts.csv"), stated).unwrap();
+    let [from, touched] = [&from, &touches].map(|p| p.to_str().unwrap());
+    let run = robotcal(&["frames", "--from", from, "--plate", "--touches", touched], &folder.path().join("frames"));
+    println!("{}", run.said());
+    assert_eq!(run.output.status.code(), Some(0));
+    let record = robotcal::output::frames_record::read(&run.file("frames.json")).unwrap();
+    assert!(record.sigma_factor < 2.0 && record.rms_m < 2e-4, "{}, {} m", record.sigma_factor, record.rms_m);
+}

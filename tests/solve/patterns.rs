@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
-use robotcal::assess::{Limits, Pattern, cause, patterns};
+use robotcal::assess::{FlangeModel, Limits, Pattern, cause, patterns};
 use robotcal::diagnose::{Finding, GivenCamera, ResidualPattern, residual_pattern};
 use robotcal::fit::Fit;
 use robotcal::identify::{Options, RobotModel, Solution, identify, stand_alone};
@@ -170,6 +170,33 @@ fn of_steps_that_take_more_than_there_is_the_simplest_names_the_cause() {
         assert!(found.statistic.is_finite() && found.rms_px.is_finite() && found.share > 0.9, "seed {seed}: {found:?}");
         assert_eq!(found.pattern, Pattern::ThinPrism, "seed {seed}");
     }
+}
+
+/// Markers as good as 0.03 mm that are said to be as good as 0.03 and 0.3 mm: what is stated of the poses is in the frame of their nominal
+/// places, and hardly depends on it; of the flange it is what the files say.
+#[test]
+fn a_pattern_is_judged_by_what_is_stated_in_the_frame_of_the_plate() {
+    let made = world(Fault::Field(0.2), 5);
+    let limits = Limits::default();
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let stated = |tolerance_m: f64| {
+        let mut plate = made.plate.clone();
+        plate.tolerance_m = tolerance_m;
+        plate.markers.iter_mut().for_each(|m| m.sigma_m = tolerance_m);
+        let seen = seen(&SimulatedSeries { plate, ..made.clone() });
+        let alone = stand_alone(std::slice::from_ref(&seen), &limits).unwrap();
+        let solution = identify(kr6_to_link_6(), &[seen], &options).unwrap();
+        let moved = |fit: &Fit| residual_pattern(fit, &limits).unwrap().found.moved.unwrap();
+        let Solution { fit, uncertainty, .. } = &solution;
+        let model = FlangeModel::of(fit, &uncertainty.covariance, &limits).unwrap();
+        let by_file = model.moved_m(&DVector::zeros(fit.problem.layout.theta_len()))[1];
+        let by_pattern = moved(fit).flange_m.unwrap()[1];
+        println!("{tolerance_m} m: {by_pattern} m, {by_file} m in the file");
+        assert!((by_pattern / by_file - 1.0).abs() < 1e-6, "{by_pattern} m, {by_file} m in the file");
+        moved(&alone.fit).pose_m[1]
+    };
+    let [good, loose] = [0.03e-3, 0.3e-3].map(stated);
+    assert!((0.8..1.3).contains(&(loose / good)), "{good} m, {loose} m");
 }
 
 /// The coefficients of a thin prism have priors, which this lens is far beyond: a part of its pattern is left.

@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use robotcal::assess::Limits;
 use robotcal::calibration::{Ends, Inputs};
+use robotcal::diagnose::Finding;
 use robotcal::fit::Fit;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
@@ -155,6 +156,56 @@ fn poses_without_postures_are_trusted_where_the_images_tell_them() {
     let [off, stated] = off_and_stated(&told.fit, &made);
     let gates = told.failed_gates();
     assert!(gates.is_empty() && off < 2.0 * stated, "{words}: {off} mm, {stated} mm stated, {gates:?}");
+}
+
+/// A camera in the hand of a UR10e at 36 stops, in any posture.
+fn ur10e(seed: u64) -> Setting {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/ur10e/ur10e.urdf");
+    let chain = robotcal::urdf::read(&urdf).unwrap().chain(Some("base_link"), Some("tool0")).unwrap();
+    let plate = Plate::lattice(PlateKind::Points, 11, 8, 0.025, 0.03e-3);
+    let request = WorldRequest {
+        images: 36,
+        mount: CameraMount::Hand,
+        marker_sigma_m: 0.03e-3,
+        errors: RobotErrors::default(),
+        joint_noise_rad: 0.05e-3,
+        pixel_sigma_px: 0.05,
+        held_out: 1,
+        seed,
+        ..WorldRequest::typical(chain.clone(), plate)
+    };
+    Setting { urdf, chain, lens: Lens::Brown, model: RobotModel::Rigid, request, words: format!("seed {seed}") }
+}
+
+/// Stops of a world that are in another posture than they were, and those that are said to be undecided.
+fn wrong_postures(seed: u64) -> [usize; 2] {
+    let Setting { urdf, chain, lens, model, request, .. } = ur10e(seed);
+    let made = series(&request).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), &made, Content::Observations).unwrap();
+    let truth = with_poses(folder.path(), &urdf, true);
+    let inputs = Inputs::read(&urdf, &[folder.path().to_owned()], Ends::default()).unwrap();
+    let seen = inputs.observe(&Limits::default(), &|_, _| ()).unwrap().series.remove(0);
+    let seen = MeasuredSeries { lens, lens_choice: LensChoice::Settled, ..seen };
+    let solution = identify(chain, &[seen], &Options { model, ..Options::default() }).unwrap();
+    let is_other = |(found, was): &(&f64, &f64)| (0.5 * (*found - *was)).sin().abs() > 1e-3;
+    let told = solution.series[0].stops.iter().map(|stop| stop.readings.as_ref().unwrap()).zip(&truth);
+    let wrong = told.filter(|(found, was)| found.iter().zip(*was).any(|pair| is_other(&pair))).count();
+    let undecided = solution.findings.iter().find_map(|finding| match finding {
+        Finding::ComputedPostures(found) => Some(found.undecided),
+        _ => None,
+    });
+    [wrong, undecided.unwrap()]
+}
+
+/// With the angles of the first stop stated; what the images leave open at single stops is counted.
+#[test]
+fn postures_are_told_where_stops_are_in_all_of_them() {
+    for seed in [1, 2] {
+        let [wrong, undecided] = wrong_postures(seed);
+        println!("seed {seed}: {wrong} wrong, {undecided} undecided");
+        assert!(wrong <= undecided, "seed {seed}: {wrong}, {undecided}");
+    }
 }
 
 #[test]

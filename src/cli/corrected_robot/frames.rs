@@ -24,7 +24,7 @@ use crate::output::frames_record::{
     self, FILE_NAME, FORMAT, FramesRecord, KnowledgeRecord, RobotOfFrames, ToolKind, ToolRecord, TouchRecord, WorkKind,
     WorkRecord, checks, flat, rows,
 };
-use crate::output::restore::{FoundModel, chain, exported_model, robot_description};
+use crate::output::restore::{FoundModel, chain, exported_model, markers_at, robot_description};
 use crate::output::solution_json::SolutionRecord;
 use crate::output::work_findings::{from_below, other_frame};
 use crate::output::{ResultFolder, folder_name, plan_files, touch_plan};
@@ -84,6 +84,7 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     let zeros = if nothing { args.readings.of_none()? } else { args.readings.of(&record, &files)? };
     zeros.iter().for_each(|zeros| touches.add(&zeros.missing));
     let placement = args.plate.as_ref().map(|name| placement_named(&record, name)).transpose()?;
+    let moved = placement.map_or_else(Vec::new, |p| touches.move_to_found(&markers_at(&record, p)));
     let robot = found.known_robot(placement)?;
     let plate = placement.map(|p| Pose::from(&record.placements[p].pose));
     let tool = known_tool(args)?;
@@ -151,12 +152,23 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     place.write_beside(&listed, std::slice::from_ref(&args.from))?;
     say!("{}", text(&args.from, &made, &fitted, &touches, &robot));
     zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
+    say_moved(&moved, touches.all.len());
     for notice in &notices {
         say_line!("note      {}", notice.coded());
     }
     say::findings(&findings);
     say_line!("results   {} ({})", args.out.display(), files.keys().cloned().collect::<Vec<_>>().join(", "));
     Ok(if findings.iter().all(|f| f.weight == Weight::Note) { Verdict::Good } else { Verdict::GateFailed })
+}
+
+/// How many touches were brought to where the markers were found, and how far, m.
+fn say_moved(moved: &[f64], touches: usize) {
+    if let Some(farthest) = moved.iter().copied().reduce(f64::max) {
+        let (count, mm) = (moved.len(), 1e3 * farthest);
+        say_line!(
+            "markers   {count} of {touches} touches are at nominal places of the plate: the markers count as found (plate.csv), up to {mm:.3} mm away"
+        );
+    }
 }
 
 /// What is to be said of the fit. The plate of a solution counts by where it brings the tool: in the base it stands as uncertainly as the base

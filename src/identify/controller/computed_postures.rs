@@ -8,9 +8,10 @@
 //! sum_i min_c (e_i - G_ic x)' V_ic^-1 (e_i - G_ic x) + x' P^-1 x
 //! ```
 //!
-//! `x` is fitted to a choice and the choice made by `x` in turns (S. Lloyd 1957), from the postures nearest to those before and from random
-//! ones; then every stop takes the posture that all others predict best, in turns. Where the axes of a wrist meet, all stops with the wrist
-//! turned over are a robot as likely as the first: the images do not tell which.
+//! `x` is fitted to a choice and the choice made by `x` in turns (S. Lloyd 1957), from the postures nearest to those before, from random ones, and
+//! from those of a beam search (B. Lowerre 1976) that takes stop after stop in, forwards and backwards; then every stop takes the posture that all
+//! others predict best, in turns. Where the axes of a wrist meet, all stops with the wrist turned over are a robot as likely as the first: the
+//! images do not tell which.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,6 +36,12 @@ use crate::stage::stage;
 const JOINT_SIGMA: f64 = 1e-4;
 /// Random choices that are started from.
 const STARTS: u64 = 64;
+/// Choices of a beam search that are gone on with.
+const WIDTH: usize = 256;
+/// The same where a fit has most postures right already.
+const WIDTH_FITTED: usize = 64;
+/// Of these the best, from which postures are fitted and chosen in turns.
+const OF_BEAM: usize = 32;
 /// The best choices of fitting and choosing in turns, from which every stop is chosen by the others.
 const DESCENDED: usize = 16;
 /// Most turns of fitting and choosing.
@@ -137,6 +144,8 @@ struct Stop {
     rows: Vec<(usize, usize)>,
     /// The first is that of the series as it stands.
     candidates: Vec<Candidate>,
+    /// `G' V^-1/2` of all candidates side by side.
+    across: DMatrix<f64>,
 }
 
 /// A choice of postures that no single stop would change.
@@ -144,6 +153,15 @@ struct Stop {
 struct Choice {
     postures: Vec<usize>,
     cost: f64,
+}
+
+/// The choice that is taken.
+struct Chosen {
+    postures: Vec<usize>,
+    /// Whether other choices at many stops together are as good.
+    is_open: bool,
+    /// Stops that are as good in another posture by themselves.
+    undecided: usize,
 }
 
 /// The stops, and the prior information of the parameters.
@@ -173,7 +191,7 @@ pub(in crate::identify) fn told_by_images<'a>(
         let chosen = stops.chosen(from, limits)?;
         Some((stops, chosen))
     });
-    let Some((stops, (chosen, is_open))) = found else { return (Cow::Borrowed(series), None) };
+    let Some((stops, chosen)) = found else { return (Cow::Borrowed(series), None) };
     let mut told = series.to_vec();
     let mut changed = 0;
     for (stop, &c) in stops.all.iter().zip(&chosen.postures).filter(|(_, c)| **c > 0) {
@@ -187,7 +205,7 @@ pub(in crate::identify) fn told_by_images<'a>(
         changed += 1;
     }
     let count = stops.all.iter().filter(|stop| series[stop.rows[0].0].readings_are_computed()).count();
-    (Cow::Owned(told), Some(Told { stops: count, changed, is_open }))
+    (Cow::Owned(told), Some(Told { stops: count, changed, is_open: chosen.is_open, undecided: chosen.undecided }))
 }
 
 /// What the images told of the postures.
@@ -199,6 +217,8 @@ pub(in crate::identify) struct Told {
     pub changed: usize,
     /// Whether other choices at many stops together are as good.
     pub is_open: bool,
+    /// Stops that fit as well in another posture, the others as they are.
+    pub undecided: usize,
 }
 
 impl Told {
@@ -213,7 +233,7 @@ impl Told {
             others.extend(turned.filter(|(g, _)| stops.insert((run, g.row))).map(|(g, _)| g.image.clone()));
         }
         let series = given.iter().filter(|s| s.readings_are_computed()).map(|s| s.name.clone()).collect();
-        ComputedPostures { series, stops: self.stops, others, is_open: self.is_open }
+        ComputedPostures { series, stops: self.stops, others, is_open: self.is_open, undecided: self.undecided }
     }
 }
 
@@ -224,30 +244,20 @@ impl Stops {
         (!all.is_empty()).then_some(Self { all, prior: compared.prior.clone() })
     }
 
-    /// The best choice, of those that are as good the one with most postures as they are, from those of a fit the one nearest to it; and whether
-    /// one that is as good is quite another.
-    fn chosen(&self, from: Before, limits: &Limits) -> Option<(Choice, bool)> {
-        let first = std::iter::once(self.settled(vec![0; self.all.len()]));
-        let random = |seed| {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            self.settled(self.all.iter().map(|s| rng.random_range(0..s.candidates.len())).collect())
-        };
-        let random: Vec<Option<Choice>> = (0..STARTS).into_par_iter().map(random).collect();
-        let mut all: Vec<Choice> = Vec::new();
-        for choice in first.chain(random).flatten() {
-            if !all.contains(&choice) {
-                all.push(choice);
-            }
-        }
-        all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        all.truncate(DESCENDED);
-        let all: Vec<Choice> = all.into_par_iter().filter_map(|c| self.descended(c.postures)).collect();
-        let base = match from {
-            Before::Nearest => all.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?.clone(),
-            Before::Fitted => self.descended(vec![0; self.all.len()])?,
-        };
+    /// The best choice, of those that are as good the one with most postures as they are, from those of a fit the one nearest to it, unless
+    /// another is clearly better; and what others are as good.
+    fn chosen(&self, from: Before, limits: &Limits) -> Option<Chosen> {
+        let all: Vec<Choice> = self.starts(from).into_par_iter().filter_map(|c| self.descended(c.postures)).collect();
+        let least = all.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?.clone();
         let equations: usize = self.all.iter().map(|s| s.candidates[0].e.len()).sum();
-        let as_good = 2.0 * limits.decisive_log_odds * (base.cost / equations as f64).max(1.0);
+        let as_good = 2.0 * limits.decisive_log_odds * (least.cost / equations as f64).max(1.0);
+        let base = match from {
+            Before::Nearest => least,
+            Before::Fitted => {
+                let fitted = self.descended(vec![0; self.all.len()])?;
+                if fitted.cost <= least.cost + as_good { fitted } else { least }
+            }
+        };
         let mut best = vec![self.without_doubtful(base.postures, as_good)?];
         for choice in all.into_iter().filter(|c| c.cost <= base.cost + as_good) {
             let postures = self.without_doubtful(choice.postures, as_good)?;
@@ -263,7 +273,77 @@ impl Stops {
         let others = |other: &Vec<usize>| other.iter().zip(postures).filter(|(a, b)| a != b).count();
         let many = limits.open_postures * self.all.len() as f64;
         let is_open = best.iter().any(|other| others(other) as f64 > many);
-        Some((self.choice(postures.clone())?, is_open))
+        let undecided = self.undecided(postures, as_good)?;
+        Some(Chosen { postures: postures.clone(), is_open, undecided })
+    }
+
+    /// Choices that no fit to them changes, the best first.
+    fn starts(&self, from: Before) -> Vec<Choice> {
+        let first = std::iter::once(self.settled(vec![0; self.all.len()]));
+        let random = |seed| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            self.settled(self.all.iter().map(|s| rng.random_range(0..s.candidates.len())).collect())
+        };
+        let random: Vec<Option<Choice>> = (0..STARTS).into_par_iter().map(random).collect();
+        let width = match from {
+            Before::Nearest => WIDTH,
+            Before::Fitted => WIDTH_FITTED,
+        };
+        let forwards: Vec<usize> = (0..self.all.len()).collect();
+        let backwards: Vec<usize> = forwards.iter().rev().copied().collect();
+        let of_beam = [forwards, backwards].into_iter().flat_map(|order| self.by_beam(&order, width));
+        let of_beam: Vec<Vec<usize>> = of_beam.collect();
+        let of_beam: Vec<Option<Choice>> = of_beam.into_par_iter().map(|postures| self.settled(postures)).collect();
+        let mut all: Vec<Choice> = Vec::new();
+        for choice in first.chain(random).chain(of_beam).flatten() {
+            if !all.contains(&choice) {
+                all.push(choice);
+            }
+        }
+        all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        all.truncate(DESCENDED);
+        all
+    }
+
+    /// The best choices where stops are taken in one after the other, and only the best so far are gone on with.
+    fn by_beam(&self, order: &[usize], width: usize) -> Vec<Vec<usize>> {
+        let mut kept = vec![(vec![0; self.all.len()], Knowledge::of_priors(&self.prior))];
+        for &s in order {
+            let stop = &self.all[s];
+            let next = |(k, (_, known)): (usize, &(Vec<usize>, Knowledge))| {
+                let factor = known.factor()?;
+                let x = factor.solve(&known.rhs);
+                let so_far = known.squares - known.rhs.dot(&x);
+                let costs = stop.predicted_by(&factor, &x)?;
+                Some(costs.into_iter().enumerate().map(move |(c, cost)| (so_far + cost, k, c)).collect::<Vec<_>>())
+            };
+            let grown: Vec<Option<Vec<(f64, usize, usize)>>> = kept.par_iter().enumerate().map(next).collect();
+            let mut grown: Vec<(f64, usize, usize)> = grown.into_iter().flatten().flatten().collect();
+            grown.sort_by(|a, b| a.0.total_cmp(&b.0));
+            grown.truncate(width);
+            let with = |&(_, k, c): &(f64, usize, usize)| {
+                let (mut postures, mut known) = kept[k].clone();
+                postures[s] = c;
+                known.add(stop.candidates[c].equations(), 1.0);
+                (postures, known)
+            };
+            kept = grown.par_iter().map(with).collect();
+        }
+        kept.into_iter().take(OF_BEAM).map(|(postures, _)| postures).collect()
+    }
+
+    /// How many stops fit as well in another posture, the others as they are.
+    fn undecided(&self, postures: &[usize], as_good: f64) -> Option<usize> {
+        let mut known = self.told_by(postures);
+        let mut count = 0;
+        for (stop, &c) in self.all.iter().zip(postures).filter(|(stop, _)| stop.candidates.len() > 1) {
+            known.add(stop.candidates[c].equations(), -1.0);
+            let costs = stop.predicted(&known)?;
+            let is_as_good = |(k, cost): (usize, &f64)| k != c && *cost <= costs[c] + as_good;
+            count += usize::from(costs.iter().enumerate().any(is_as_good));
+            known.add(stop.candidates[c].equations(), 1.0);
+        }
+        Some(count)
     }
 
     /// What a choice says of the parameters.
@@ -332,6 +412,7 @@ impl Stops {
 }
 
 /// Normal equations of the parameters.
+#[derive(Clone)]
 pub(super) struct Knowledge {
     information: DMatrix<f64>,
     pub rhs: DVector<f64>,
@@ -346,7 +427,7 @@ impl Knowledge {
 
     /// Takes a posture of a stop in, or by a weight of -1 out again.
     pub fn add(&mut self, (g, e): (&DMatrix<f64>, &DVector<f64>), weight: f64) {
-        self.information.gemm_tr(weight, g, g, 1.0);
+        self.information.gemm(weight, &g.transpose(), g, 1.0);
         self.rhs.gemv_tr(weight, g, e, 1.0);
         self.squares += weight * e.norm_squared();
     }
@@ -368,13 +449,18 @@ impl Stop {
     /// What every posture adds to the cost of the other stops: with `r = e - G x` and `W = 1 + G N^-1 G'` by their `x` and `N`, `r' W^-1 r`.
     fn predicted(&self, others: &Knowledge) -> Option<Vec<f64>> {
         let factor = others.factor()?;
-        let x = factor.solve(&others.rhs);
-        let cost = |Candidate { g, e, .. }: &Candidate| {
-            let w = DMatrix::identity(e.len(), e.len()) + g * factor.solve_many(&g.transpose());
-            let r = e - g * &x;
+        self.predicted_by(&factor, &factor.solve(&others.rhs))
+    }
+
+    fn predicted_by(&self, factor: &SymmetricFactor, x: &DVector<f64>) -> Option<Vec<f64>> {
+        let solved = factor.solve_many(&self.across);
+        let cost = |(c, Candidate { g, e, .. }): (usize, &Candidate)| {
+            let mut w = DMatrix::identity(e.len(), e.len());
+            w.gemm(1.0, g, &solved.columns(c * e.len(), e.len()), 1.0);
+            let r = e - g * x;
             Some(r.dot(&w.cholesky()?.solve(&r)))
         };
-        self.candidates.iter().map(cost).collect()
+        self.candidates.iter().enumerate().map(cost).collect()
     }
 }
 
@@ -396,7 +482,9 @@ fn stop(compared: &Compared, series: &[MeasuredSeries], images: &[usize]) -> Opt
         Some(Candidate { readings, g, e })
     };
     let candidates = std::iter::once(own).chain(others).map(of).collect::<Option<Vec<_>>>()?;
-    Some(Stop { rows, candidates })
+    let rows_of_g: Vec<_> = candidates.iter().flat_map(|c| c.g.row_iter()).collect();
+    let across = DMatrix::from_rows(&rows_of_g).transpose();
+    Some(Stop { rows, candidates, across })
 }
 
 /// A stop in another posture than that in which it was `read`, reached from the same stop before.

@@ -1,5 +1,6 @@
 //! solution.json back into what a solve goes from, and into the model that it found.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use nalgebra::{DMatrix, Vector3, Vector6};
@@ -9,7 +10,7 @@ use super::series_record::StopNoise;
 use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
 use crate::assess::{FlangeModel, Limits, usual_joint_sigma};
 use crate::error::{Code, Error, Result};
-use crate::frames::KnownRobot;
+use crate::frames::{KnownRobot, TouchedMarker};
 use crate::geom::Pose;
 use crate::identify::Options;
 use crate::model::camera::Camera;
@@ -182,7 +183,7 @@ pub struct FoundModel {
     pub layout: Layout,
     /// What stands still in the base frame for the first image on the robot, and its first column.
     pub still: Option<(Pose, usize)>,
-    /// Covariance of the columns of `layout`, m and rad; of a plate that is fitted bent its frame is, by the mean of the bow, another than that of `still`.
+    /// Covariance of the columns of `layout`, m and rad, with the plates in the frames of their nominal markers, as `still` is.
     pub covariance: DMatrix<f64>,
     /// Stops of the images in use.
     pub stops: Vec<Posture>,
@@ -243,6 +244,14 @@ pub fn exported_model(record: &SolutionRecord) -> Result<FoundModel> {
     model.robot = exported_robot(record)?;
     model.stops.iter_mut().for_each(|stop| add(&mut stop.readings, &entered));
     Ok(model)
+}
+
+/// The markers of the plates that stood at a placement.
+pub fn markers_at(record: &SolutionRecord, placement: usize) -> Vec<TouchedMarker> {
+    let plates: BTreeSet<usize> = record.images.iter().filter(|i| i.placement == placement).map(|i| i.plate).collect();
+    let plates = plates.into_iter().filter_map(|p| record.plates.get(p));
+    let markers = plates.flat_map(|p| p.nominal_m.iter().zip(&p.position_m));
+    markers.map(|(nominal, found)| TouchedMarker { nominal: (*nominal).into(), found: (*found).into() }).collect()
 }
 
 /// Adds offsets to readings.

@@ -211,6 +211,11 @@ impl InFrame {
         own.fixed_view::<6, 6>(start, start).into_owned()
     }
 
+    /// Covariance of the camera pose of every image in use, tied to the robot or not, as its body twist, m and rad.
+    pub fn camera_poses(&self, linear: LinearProblem) -> Vec<Matrix6<f64>> {
+        self.covariance.camera_poses(linear)
+    }
+
     /// Covariances of the free camera poses of all images in use.
     pub fn poses(&self, linear: LinearProblem) -> Vec<Matrix6<f64>> {
         let of = |c: DMatrix<f64>| {
