@@ -197,7 +197,8 @@ fn require_same_series(folder: &Path, given: &[PathBuf], inputs: &Inputs) -> Res
     for (path, s) in given.iter().zip(&inputs.series) {
         let stands_there = paths.iter().any(|file| file.starts_with(real(path)));
         let is_known = |file: &InputFile| hashes.contains(file.sha256.as_str());
-        if !stands_there && !(s.inputs.iter().all(is_known) && s.image_hashes()?.iter().all(is_known)) {
+        let is_same = stands_there || s.inputs.iter().all(is_known) && s.image_hashes()?.iter().all(is_known);
+        if !is_same {
             return refused(format!("holds the result of other series than {}", path.display()));
         }
     }

@@ -45,14 +45,14 @@ impl<const N: usize> Influences<N> {
 /// Of the centre of a disc, or the two centres of an annulus.
 pub enum OfCentres {
     Disc(Influences<2>),
-    Annulus(Influences<4>),
+    Annulus(Box<Influences<4>>),
 }
 
 impl OfCentres {
     pub fn of(solved: &Solved, pixels: &Pixels) -> Self {
         match solved.state.inner {
             None => Self::Disc(Influences::of(solved, [CENTRE, CENTRE + 1], pixels)),
-            Some(_) => Self::Annulus(Influences::of(solved, [CENTRE, CENTRE + 1, INNER, INNER + 1], pixels)),
+            Some(_) => Self::Annulus(Box::new(Influences::of(solved, [CENTRE, CENTRE + 1, INNER, INNER + 1], pixels))),
         }
     }
 

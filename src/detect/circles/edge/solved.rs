@@ -29,11 +29,6 @@ impl Solved {
     pub(super) fn even(&self, flat: &Flat) -> Normal {
         let mut even = [[0.0; ANNULUS]; ANNULUS];
         flat.add_normal(&self.state, self.noise, &mut even);
-        for i in 0..ANNULUS {
-            for j in 0..i {
-                even[j][i] = even[i][j];
-            }
-        }
-        even
+        std::array::from_fn(|i| std::array::from_fn(|j| even[i.max(j)][i.min(j)]))
     }
 }

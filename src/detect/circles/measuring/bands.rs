@@ -15,8 +15,8 @@ const ENOUGH: f64 = 32.0;
 const LEAST_PIXELS: f64 = 1000.0;
 /// How far pixels may lie from opposite each other, half px: where there are many markers, and at most.
 const ASTRAY: (f64, f64) = (0.25, 0.5);
-/// Markers whose response to noise is computed: they are much alike.
-const RESPONSES: f64 = 8.0;
+/// Markers whose response to noise is computed, at most: they are much alike.
+const RESPONSES: f64 = 4.0;
 
 /// Bands of markers that were fitted for white noise.
 pub(in crate::detect::circles) struct Bands {
@@ -37,7 +37,7 @@ impl Bands {
         // Both coordinates are even over the range.
         let astray = (ASTRAY.1 * (ENOUGH / markers).sqrt()).clamp(ASTRAY.0, ASTRAY.1);
         let taken = markers * (astray / ASTRAY.1).powi(2);
-        let stride = (taken / RESPONSES).max(1.0) as usize;
+        let stride = (taken / RESPONSES).ceil().max(1.0) as usize;
         Self { astray, stride, influences: Vec::new(), left: Vec::new(), parts: Vec::new() }
     }
 
