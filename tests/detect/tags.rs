@@ -146,6 +146,25 @@ fn clipped_paper_moves_no_corner_of_an_aprilgrid() {
     assert!(tally.found as f64 >= 0.95 * tally.visible as f64 && tally.rms < 0.03, "{tally:?}");
 }
 
+/// A lens that bends sides of 350 px and more by up to 10 px: the line between two corners is no place to look for the whole side.
+#[test]
+fn sides_that_the_lens_bends_far_are_measured_to_their_ends() {
+    let near = |rng: &mut ChaCha8Rng| View {
+        focal_px: 760.0,
+        distortion: [-0.3, 0.09, 0.0, 2e-3, -1.5e-3],
+        distance_m: rng.random_range(0.24..0.28),
+        tilt_deg: rng.random_range(0.0..20.0),
+        aim_m: [rng.random_range(-0.02..0.02), rng.random_range(-0.02..0.02)],
+        ..view(rng)
+    };
+    for text in [APRILTAG, MARKER] {
+        let tally = run_views(text, 0.72, near);
+        assert_eq!(tally.wrong, 0, "{text}");
+        assert!(tally.found >= 18 && tally.rms < 0.05, "{text}: {tally:?}");
+        assert!((0.5..2.0).contains(&tally.normalised.powi(2)), "{text}: {tally:?}");
+    }
+}
+
 /// Grey values as most files of cameras have them: the light to the power of 1 / 2.2.
 fn encoded(mut picture: Picture) -> Picture {
     let full = picture.full_scale;

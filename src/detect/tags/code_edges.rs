@@ -64,11 +64,22 @@ impl CodeEdge {
         place(self.axis, self.line as f64, 0.5 * (self.along.start + self.along.end) as f64)
     }
 
-    /// Measures it; `map` leads from modules to the picture. `None` where it is too short, or no edge.
-    pub fn fit(&self, picture: &Picture, map: &PlaneMap, tag: &Printed) -> Option<EdgeLine> {
+    /// Measures it; `map` leads from modules to the picture, and `off` says how far to the light of there a place of it is looked for, px.
+    /// `None` where it is too short, or no edge.
+    pub fn fit(
+        &self,
+        picture: &Picture,
+        map: &PlaneMap,
+        tag: &Printed,
+        off: impl Fn([f64; 2]) -> f64,
+    ) -> Option<EdgeLine> {
         let frame = Frame::of(self, map)?;
+        let [from, to] = [(frame.from, frame.ends[0]), (frame.to, frame.ends[1])].map(|(p, end)| {
+            let [x, y] = frame.along;
+            [p[0] + y * off(end), p[1] - x * off(end)]
+        });
         let [ink_px, paper_px] = [false, true].map(|light| frame.module_px * self.depth(tag, light) as f64);
-        let side = Side { from: frame.from, to: frame.to, ink_px, paper_px };
+        let side = Side { from, to, ink_px, paper_px };
         EdgeLine::fit(picture, &side, || self.beside(tag, map, &frame)).ok()
     }
 
@@ -114,6 +125,8 @@ fn sorted([a, b]: [f64; 2]) -> [f64; 2] {
 struct Frame {
     from: [f64; 2],
     to: [f64; 2],
+    /// The same in modules.
+    ends: [[f64; 2]; 2],
     /// Unit vector of the way.
     along: [f64; 2],
     /// Width of a module across it.
@@ -125,11 +138,11 @@ impl Frame {
         let line = edge.line as f64;
         let ends = [edge.along.start, edge.along.end].map(|at| place(edge.axis, line, at as f64));
         let turned = (edge.axis == 0) != (edge.to_light > 0.0);
-        let [from, to] = if turned { [ends[1], ends[0]] } else { ends };
-        let (from, to) = (map.apply(from)?, map.apply(to)?);
+        let ends = if turned { [ends[1], ends[0]] } else { ends };
+        let (from, to) = (map.apply(ends[0])?, map.apply(ends[1])?);
         let way = [to[0] - from[0], to[1] - from[1]];
         let length = way[0].hypot(way[1]);
-        let mut frame = Self { from, to, along: way.map(|v| v / length), module_px: 0.0 };
+        let mut frame = Self { from, to, ends, along: way.map(|v| v / length), module_px: 0.0 };
         let middle = edge.middle();
         let next = |by: f64| {
             let mut next = middle;

@@ -4,37 +4,64 @@
 //!
 //! ```text
 //! I = min(full scale, d(x) + h(x) (Phi((y - e(x)) / s) + B(x, e(x) - y)))
-//! e(x) = o + a x + c x^2,  h(x) = h0 + h1 x,  d(x) = d0 + d1 x + d2 x^2
+//! e(x) = o + a x + c x^2 + c3 x^3 + c4 x^4,  h(x) = h0 + h1 x,  d(x) = d0 + d1 x + d2 x^2
 //! B(x, t) = sum of step (Phi((x - x0) / s) - Phi((x - x1) / s)) (Phi((t - t0) / s) - Phi((t - t1) / s))
 //! ```
 //!
 //! `B` is what lies beside the side, in rectangles: light modules of the code within a border of one module, and the next tag. It counts where
 //! the blur is a fifth of the border, or about that, or more, and is laid again, for the side and the blur that were found, until these rest.
 //!
-//! `c` carries what lens distortion bends, with a prior of [`BEND`] per picture width; everything else is free but for wide priors.
+//! `c`, `c3` and `c4` carry what lens distortion bends, with priors of [`BENDS`] per picture width: of short sides nothing but `c`. Everything
+//! else is free but for wide priors. The pixels are those of a band about the side: about the line between its ends at first, wider by
+//! what the lens may bend, and laid again until it lies about what was found.
+//!
 //! Glare adds the same to ink and paper: where it clips the paper, the curve of the ink says where half of the step is. The ends
 //! are left out, where the next side rounds the corner off. Two sides cross at the corner; its covariance is that of their
-//! `(o, a, c)` at the noise that the residuals show.
+//! `(o, a, c, c3, c4)` at the noise that the residuals show.
 
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use crate::detect::Picture;
 use crate::detect::circles::normal_tail;
 use crate::detect::shared::{SATURATED, SYSTEMATIC_PX};
 
-/// Parameters: o, a, c, ln s, h0, h1, d0, d1, d2.
-const PARAMETERS: usize = 9;
+/// Of a side: o, a, c, c3, c4.
+const SHAPE: usize = 5;
+/// Parameters: those of a side, ln s, h0, h1, d0, d1, d2.
+const PARAMETERS: usize = SHAPE + 6;
+/// Of these, `c3` and `c4` are known beforehand where pixels are few.
+const FEW_PARAMETERS: usize = PARAMETERS - 2;
+const BLUR: usize = SHAPE;
+const STEP: usize = SHAPE + 1;
+const DARK: usize = SHAPE + 3;
 type Normal = SMatrix<f64, PARAMETERS, PARAMETERS>;
 type Column = SVector<f64, PARAMETERS>;
+type Shape = SVector<f64, SHAPE>;
 
-/// Prior sigma of the curvature of a side times the width of the picture: k1 = 0.3 half way to the corner gives 0.15.
-const BEND: f64 = 0.15;
+/// Prior sigmas of the terms of second to fifth order of what the lens bends times the first to fourth power of the width of the picture: k1 =
+/// 0.3 half way to the corner gives 0.15; the square of such a k1, and a k2 of that size, at a focal length of 0.6 widths give the last two.
+const BENDS: [f64; 4] = [0.15, 0.3, 0.3, 2.0];
+/// Least part of these, but the first, that a straight side is allowed: the bend `c` of a side, in sigmas of its own, tells how far its line is
+/// from the axis of the lens, and all that the lens bends is in proportion to that.
+const LEAST_BENT: f64 = 0.01;
+/// What a lens bends at most, in sigmas of the first of these.
+const BENT_SIGMAS: f64 = 2.0;
+/// A side that is bent by less, px, lies in the band about the line between its ends.
+const BENT_PX: f64 = 1.0;
+/// Times that levels and bend are told from each other to begin with.
+const STARTS: usize = 4;
+/// Most px by which one step bends a side.
+const BEND_STEP_PX: f64 = 2.0;
+/// A band that lies so far off, px, shows the whole edge as well.
+const BAND_OFF_PX: f64 = 0.2;
 /// Prior of the blur, px, and its sigma (of the logarithm).
 const USUAL_BLUR_PX: f64 = 0.9;
 const BLUR_SIGMA: f64 = 0.6;
 /// Of the blur, px; others are no edges of a usable picture.
 const BLUR_RANGE_PX: (f64, f64) = (0.2, 8.0);
 const MOST_STEPS: usize = 24;
+/// Beside what the next side rounds off, so much of both ends is left out, px: they are not known better.
+pub(super) const ENDS_SPARE_PX: f64 = 1.0;
 /// A step below this moves no corner visibly, px; and what is good enough where pixels pass in and out of saturation.
 const AT_REST_PX: f64 = 1e-4;
 const NEARLY_AT_REST_PX: f64 = 5e-3;
@@ -56,9 +83,22 @@ const FARTHEST_PX: f64 = 3.0;
 /// Residuals above this share of the contrast are another structure.
 const WORST: f64 = 0.12;
 
-/// Prior sigma of the curvature of a side, 1/px.
-pub(super) fn bend(picture: &Picture) -> f64 {
-    BEND / picture.width.max(picture.height) as f64
+/// Prior sigmas of the terms of second to fifth order of what the lens bends, px per power of px.
+pub(super) fn bends(picture: &Picture) -> [f64; 4] {
+    let width = picture.width.max(picture.height) as f64;
+    [1, 2, 3, 4].map(|k| BENDS[k as usize - 1] / width.powi(k))
+}
+
+/// Powers of a place along a side.
+fn powers(x: f64) -> Shape {
+    Shape::from([1.0, x, x * x, x.powi(3), x.powi(4)])
+}
+
+/// By how much a side of this length moves at most as a straight one, and by how much it is bent, px.
+fn moved_px(state: &Column, length: f64) -> [f64; 2] {
+    let terms = state.fixed_rows::<SHAPE>(0).abs().component_mul(&powers(length / 2.0));
+    let straight = terms[0] + terms[1];
+    [straight, terms.sum() - straight]
 }
 
 /// Where a side is looked for.
@@ -102,7 +142,7 @@ pub struct EdgeLine {
     middle: Vector2<f64>,
     along: Vector2<f64>,
     across: Vector2<f64>,
-    shape: Vector3<f64>,
+    shape: Shape,
     fit: Fit,
 }
 
@@ -112,7 +152,7 @@ pub type Measured = Result<EdgeLine, &'static str>;
 /// How well a side is known.
 #[derive(Debug, Clone, Copy)]
 struct Fit {
-    covariance: SMatrix<f64, 3, 3>,
+    covariance: SMatrix<f64, SHAPE, SHAPE>,
     /// Variance of a displacement towards the light that the sides of a tag have in common, px^2.
     common: f64,
     /// Root mean square of the residuals on the paper, the step to it from the ink, and the ink, counts.
@@ -147,7 +187,7 @@ impl EdgeLine {
             middle: (from + to) / 2.0,
             along,
             across: Vector2::new(along.y, -along.x),
-            shape: Vector3::zeros(),
+            shape: Shape::zeros(),
             fit: Fit {
                 covariance: SMatrix::zeros(),
                 common: 0.0,
@@ -159,25 +199,29 @@ impl EdgeLine {
             },
         };
         let mut state = Column::zeros();
-        state[3] = USUAL_BLUR_PX.ln();
+        state[BLUR] = USUAL_BLUR_PX.ln();
+        let bent_px = BENT_SIGMAS * bends(picture)[0] * (length / 2.0).powi(2);
+        let mut spare_px = if bent_px > BENT_PX { bent_px } else { 0.0 };
         let mut around: Option<Vec<Beside>> = None;
-        // the band is laid again where the first fit found the side, as wide as its blur asks for
+        // the band is laid again where the last fit found the side, as wide as its blur asks for
         for round in 0..MOST_ROUNDS {
             let before = state;
-            line.shape = Vector3::new(state[0], state[1], state[2]);
-            let mut pixels = line.band(picture, side, length, state[3].exp())?;
+            line.shape = state.fixed_rows::<SHAPE>(0).into_owned();
+            let mut pixels = line.band(picture, side, length, [state[BLUR].exp(), spare_px])?;
             if round == 0 {
-                start(&pixels, &mut state)?;
-            } else if around.is_some() || state[3].exp() > SHINES_THROUGH * side.ink_px {
-                line.lighten(&mut pixels, around.get_or_insert_with(&beside), state[3].exp());
+                start(&pixels, &mut state, spare_px > 0.0)?;
+            } else if around.is_some() || state[BLUR].exp() > SHINES_THROUGH * side.ink_px {
+                line.lighten(&mut pixels, around.get_or_insert_with(&beside), state[BLUR].exp());
             }
             line.fit = iterate(picture, &pixels, length, &mut state)?;
             let is_lit = around.as_ref().is_some_and(|around| !around.is_empty());
             line.fit.is_lit = is_lit;
             let moved = state - before;
-            let moved_px = moved[0].abs() + moved[1].abs() * length / 2.0 + moved[3].abs() * state[3].exp();
-            if round > 0 && (!is_lit || moved_px < NEARLY_AT_REST_PX) {
-                line.shape = Vector3::new(state[0], state[1], state[2]);
+            let [straight, bent] = moved_px(&moved, length);
+            let moved_px = straight + moved[BLUR].abs() * state[BLUR].exp();
+            spare_px = 0.0;
+            if round > 0 && moved_px + bent < BAND_OFF_PX && (!is_lit || moved_px < NEARLY_AT_REST_PX) {
+                line.shape = state.fixed_rows::<SHAPE>(0).into_owned();
                 return Ok(line);
             }
         }
@@ -208,20 +252,25 @@ impl EdgeLine {
         self.fit.blur_px
     }
 
-    /// The pixels of the band: without the ends, and as far to both sides as nothing disturbs.
-    fn band(&self, picture: &Picture, side: &Side, length: f64, blur_px: f64) -> Result<Vec<Pixel>, &'static str> {
-        let half = length / 2.0 - (2.5 * blur_px + 1.0).min(length / 4.0);
+    /// The pixels of the band: without the ends, and as far to both sides as nothing disturbs: what blur asks for, px, and what is to spare.
+    fn band(
+        &self,
+        picture: &Picture,
+        side: &Side,
+        length: f64,
+        [blur_px, spare_px]: [f64; 2],
+    ) -> Result<Vec<Pixel>, &'static str> {
+        let half = length / 2.0 - (2.5 * blur_px + ENDS_SPARE_PX).min(length / 4.0);
         let reach = 3.0 * blur_px + 1.0;
-        let room = |px: f64| reach.min((px - CLEAR_OF_BLURS * blur_px).max(0.5 * px).max(1.0));
+        let room = |px: f64| (reach + spare_px).min((px - CLEAR_OF_BLURS * blur_px).max(0.5 * px).max(1.0));
         let (inner, outer) = (room(side.ink_px), room(side.paper_px));
-        let far = self.across * reach.max(1.0);
-        let ends = [self.middle - self.along * half, self.middle + self.along * half];
-        let corners = [ends[0] - far, ends[0] + far, ends[1] - far, ends[1] + far];
-        let low = corners.iter().fold(Vector2::repeat(f64::MAX), |m, p| m.inf(p));
-        let high = corners.iter().fold(Vector2::repeat(f64::MIN), |m, p| m.sup(p));
-        if low.min() < 0.0 || high.x > picture.width as f64 - 1.0 || high.y > picture.height as f64 - 1.0 {
+        let [low, high] = self.extent(half, reach);
+        let last = Vector2::new(picture.width as f64 - 1.0, picture.height as f64 - 1.0);
+        if low.min() < 0.0 || high.x > last.x || high.y > last.y {
             return Err("cut by the border");
         }
+        let low = low.add_scalar(-spare_px).sup(&Vector2::zeros());
+        let high = high.add_scalar(spare_px).inf(&last);
         let limit = SATURATED * picture.full_scale;
         let mut pixels = Vec::new();
         for v in low.y.ceil() as usize..=high.y.floor() as usize {
@@ -235,11 +284,24 @@ impl EdgeLine {
                 }
             }
         }
-        if pixels.len() < 3 * PARAMETERS { Err("too small") } else { Ok(pixels) }
+        if pixels.len() < 3 * FEW_PARAMETERS { Err("too small") } else { Ok(pixels) }
+    }
+
+    /// Where the side is, px to both sides of it, least and most in the picture.
+    fn extent(&self, half: f64, reach: f64) -> [Vector2<f64>; 2] {
+        let places = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|part| part * half);
+        let beside = places.map(|x| [-reach, reach].map(|y| (x, self.offset(x) + y)));
+        let points = beside.into_iter().flatten().map(|(x, y)| self.middle + self.along * x + self.across * y);
+        points
+            .fold([Vector2::repeat(f64::MAX), Vector2::repeat(f64::MIN)], |[low, high], p| [low.inf(&p), high.sup(&p)])
     }
 
     fn offset(&self, x: f64) -> f64 {
-        self.shape[0] + x * (self.shape[1] + x * self.shape[2])
+        self.shape.dot(&powers(x))
+    }
+
+    fn slope(&self, x: f64) -> f64 {
+        self.shape.dot(&Shape::from([0.0, 1.0, 2.0 * x, 3.0 * x * x, 4.0 * x.powi(3)]))
     }
 
     /// Root mean square of the residuals on the paper, counts.
@@ -263,9 +325,11 @@ impl EdgeLine {
         d.dot(&self.across) - self.offset(d.dot(&self.along))
     }
 
-    /// How far its middle lies towards the light of where it was looked for, px, and the variance of that.
-    pub fn offset_at_middle(&self) -> (f64, f64) {
-        (self.shape[0], self.fit.covariance[(0, 0)])
+    /// How far it lies towards the light of a place beside it, px, and the variance of that.
+    pub fn offset_from(&self, place: [f64; 2]) -> (f64, f64) {
+        let d = Vector2::from(place) - self.middle;
+        let x = d.dot(&self.along);
+        (self.offset(x) - d.dot(&self.across), powers(x).dot(&(self.fit.covariance * powers(x))))
     }
 
     /// The side when its ink ends so many px earlier, a number with this variance that the sides of a tag have in common, px^2.
@@ -286,9 +350,9 @@ impl EdgeLine {
                 let d = p - line.middle;
                 let (x, y) = (d.dot(&line.along), d.dot(&line.across));
                 left[k] = y - line.offset(x);
-                let slope = line.across - line.along * (line.shape[1] + 2.0 * line.shape[2] * x);
+                let slope = line.across - line.along * line.slope(x);
                 slopes.set_row(k, &slope.transpose());
-                let terms = Vector3::new(1.0, x, x * x);
+                let terms = powers(x);
                 variance[k] = (terms.transpose() * line.fit.covariance * terms)[0];
             }
             p -= slopes.try_inverse()? * left;
@@ -303,39 +367,68 @@ impl EdgeLine {
     }
 }
 
-/// Levels of ink and paper to begin with.
-fn start(pixels: &[Pixel], state: &mut Column) -> Result<(), &'static str> {
-    let mean = |sign: f64| {
-        let far = pixels.iter().map(|p| sign * p.y).fold(f64::MIN, f64::max);
-        let values: Vec<f64> = pixels.iter().filter(|p| sign * p.y > 0.5 * far).map(|p| p.value).collect();
-        values.iter().sum::<f64>() / values.len().max(1) as f64
-    };
-    state[6] = mean(-1.0);
-    state[4] = mean(1.0) - state[6];
-    if state[4] > 0.0 { Ok(()) } else { Err("no contrast") }
+/// Levels of ink and paper to begin with, and, where asked for, how far off and how bent the side is.
+fn start(pixels: &[Pixel], state: &mut Column, is_bent: bool) -> Result<(), &'static str> {
+    for _ in 0..if is_bent { STARTS } else { 1 } {
+        let side = state.fixed_rows::<SHAPE>(0).into_owned();
+        let beside = |p: &Pixel| p.y - side.dot(&powers(p.x));
+        let mean = |sign: f64| {
+            let far = pixels.iter().map(|p| sign * beside(p)).fold(f64::MIN, f64::max);
+            let values: Vec<f64> = pixels.iter().filter(|p| sign * beside(p) > 0.5 * far).map(|p| p.value).collect();
+            values.iter().sum::<f64>() / values.len().max(1) as f64
+        };
+        state[DARK] = mean(-1.0);
+        state[STEP] = mean(1.0) - state[DARK];
+        if state[STEP] <= 0.0 {
+            return Err("no contrast");
+        }
+        if is_bent {
+            [state[0], state[2]] = bent_by_areas(pixels, [state[DARK], state[STEP]]);
+        }
+    }
+    Ok(())
+}
+
+/// Terms of order 0 and 2 of a side, from the light that is missing beyond the line between its ends: over a band, the sum of
+/// (share of the light - that of a side along the line) times a function of x is minus the integral of the side times it.
+fn bent_by_areas(pixels: &[Pixel], [dark, step]: [f64; 2]) -> [f64; 2] {
+    let half = pixels.iter().map(|p| p.x.abs()).fold(0.0, f64::max);
+    let mut sums = [0.0; 2];
+    for p in pixels {
+        let excess = (p.value - dark) / step - if p.y > 0.0 { 1.0 } else { 0.0 };
+        sums[0] -= excess;
+        sums[1] -= excess * (p.x * p.x - half * half / 3.0);
+    }
+    // the second is orthogonal to the first, and the integral of its square is 8/45 half^5
+    let (mean, bend) = (sums[0] / (2.0 * half), sums[1] / (8.0 / 45.0 * half.powi(5)));
+    [mean - bend * half * half / 3.0, bend]
 }
 
 /// Gauss-Newton steps to the end.
 fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column) -> Result<Fit, &'static str> {
-    let mut noise = 0.03 * state[4];
+    let mut noise = 0.03 * state[STEP];
     let farthest = (FARTHEST * length).max(FARTHEST_PX);
     let first = *state;
-    let (level, slope) = (LEVEL * first[4], SLOPE_PER_PX * first[4]);
+    let (level, slope) = (LEVEL * first[STEP], SLOPE_PER_PX * first[STEP]);
+    let [second, third, fourth, _] = bends(picture);
+    let part = (first[2].abs() / second).clamp(LEAST_BENT, 1.0);
     let priors = [
-        (2, 0.0, bend(picture)),
-        (3, USUAL_BLUR_PX.ln(), BLUR_SIGMA),
-        (4, first[4], level),
-        (5, 0.0, slope),
-        (6, first[6], level),
-        (7, 0.0, slope),
-        (8, 0.0, slope / (2.0 * length)),
+        (2, 0.0, second),
+        (3, 0.0, part * third),
+        (4, 0.0, part * fourth),
+        (BLUR, USUAL_BLUR_PX.ln(), BLUR_SIGMA),
+        (STEP, first[STEP], level),
+        (STEP + 1, 0.0, slope),
+        (DARK, first[DARK], level),
+        (DARK + 1, 0.0, slope),
+        (DARK + 2, 0.0, slope / (2.0 * length)),
     ];
     for round in 1..=MOST_STEPS {
         let Sums { mut normal, mut gradient, square, used, paper } = sums(pixels, state, picture.full_scale);
-        if used < 2 * PARAMETERS {
+        if used < 2 * FEW_PARAMETERS {
             return Err("saturated");
         }
-        noise = f64::max((square / (used - PARAMETERS) as f64).sqrt(), 0.3).min(noise.max(0.3) * 2.0);
+        noise = f64::max((square / (used - FEW_PARAMETERS) as f64).sqrt(), 0.3).min(noise.max(0.3) * 2.0);
         let information = 1.0 / (noise * noise);
         normal *= information;
         gradient *= information;
@@ -345,22 +438,30 @@ fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column)
         }
         let factor = normal.cholesky().ok_or("no edge")?;
         let mut step = factor.solve(&gradient);
-        let largest = (step[0].abs() / 1.0).max(step[1].abs() * length / 2.0).max(step[3].abs() / 0.5);
+        let largest = (step[0].abs() / 1.0).max(step[1].abs() * length / 2.0).max(step[BLUR].abs() / 0.5);
+        let largest = largest.max(moved_px(&step, length)[1] / BEND_STEP_PX);
         // pixels that pass in and out of saturation would have it swing for ever
         let damping = if round > MOST_STEPS / 2 { 2.0 } else { 1.0 };
         step /= largest.max(1.0) * damping;
         *state += step;
-        let blur = state[3].exp();
-        let far = state[0].abs() + state[1].abs() * length / 2.0 > farthest;
+        let blur = state[BLUR].exp();
+        let far = moved_px(state, length)[0] > farthest;
         if far || !(BLUR_RANGE_PX.0..BLUR_RANGE_PX.1).contains(&blur) || !step.iter().all(|v| v.is_finite()) {
             return Err("no edge");
         }
         let rest = if round < MOST_STEPS { AT_REST_PX } else { NEARLY_AT_REST_PX };
-        if step[0].abs() + step[1].abs() * length / 2.0 < rest {
-            let (contrast, paper_residual) = (state[4], (paper.0 / paper.1.max(1.0)).sqrt());
-            let covariance = factor.inverse().fixed_view::<3, 3>(0, 0).into_owned();
-            let fit =
-                Fit { covariance, common: 0.0, paper_residual, contrast, dark: state[6], blur_px: blur, is_lit: false };
+        if moved_px(&step, length)[0] < rest {
+            let (contrast, paper_residual) = (state[STEP], (paper.0 / paper.1.max(1.0)).sqrt());
+            let covariance = factor.inverse().fixed_view::<SHAPE, SHAPE>(0, 0).into_owned();
+            let fit = Fit {
+                covariance,
+                common: 0.0,
+                paper_residual,
+                contrast,
+                dark: state[DARK],
+                blur_px: blur,
+                is_lit: false,
+            };
             return if noise < WORST * contrast { Ok(fit) } else { Err("disturbed surroundings") };
         }
     }
@@ -378,11 +479,13 @@ struct Sums {
 
 fn sums(pixels: &[Pixel], state: &Column, full_scale: f32) -> Sums {
     let mut out = Sums { normal: Normal::zeros(), gradient: Column::zeros(), square: 0.0, used: 0, paper: (0.0, 0.0) };
-    let blur = state[3].exp();
+    let blur = state[BLUR].exp();
     let limit = f64::from(SATURATED * full_scale);
     for p in pixels {
-        let u = (p.y - state[0] - p.x * (state[1] + p.x * state[2])) / blur;
-        let (step, dark) = (state[4] + state[5] * p.x, state[6] + p.x * (state[7] + p.x * state[8]));
+        let terms = powers(p.x);
+        let u = ((p.y - state.fixed_rows::<SHAPE>(0).dot(&terms)) / blur).clamp(-FAR_BLURS, FAR_BLURS);
+        let (step, dark) =
+            (state[STEP] + state[STEP + 1] * p.x, state[DARK] + p.x * (state[DARK + 1] + p.x * state[DARK + 2]));
         let (tail, phi) = normal_tail(u as f32);
         let share = 1.0 - f64::from(tail) + p.light;
         let value = dark + step * share;
@@ -393,8 +496,10 @@ fn sums(pixels: &[Pixel], state: &Column, full_scale: f32) -> Sums {
         let density = step * f64::from(phi) / blur;
         let row = Column::from([
             -density,
-            -density * p.x,
-            -density * p.x * p.x,
+            -density * terms[1],
+            -density * terms[2],
+            -density * terms[3],
+            -density * terms[4],
             -density * u * blur,
             share,
             share * p.x,

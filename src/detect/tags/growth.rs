@@ -10,12 +10,13 @@
 //!
 //! with `x` its place on the tag, from -1 to 1, and `n` the unit vector to its light. `q` is smooth: what the noise of the sides leaves of the
 //! map, and what the lens bends, in powers of `x` with priors. Light and dark stand on both sides of edges, so that `g` is told from `q`.
+//! The sides themselves, whose `n.x` is 1, tell of `q` how far the lens bends them; edges are looked for where `q` says, again where that changes.
 
 use nalgebra::{SMatrix, SVector};
 
 use super::beside::Printed;
 use super::code_edges::{CodeEdge, code_edges};
-use super::edge_line::{EdgeLine, bend};
+use super::edge_line::{Measured, bends};
 use super::quads::{Quad, distance};
 use crate::detect::Picture;
 use crate::detect::circles::variance_factor;
@@ -30,11 +31,18 @@ const OTHER_STEP: f64 = 0.75;
 /// Residuals beyond so many sigmas count less, in proportion.
 const FAR_SIGMAS: f64 = 2.5;
 const ROUNDS: usize = 12;
-/// Of a component of `q`: 1, x, y, 1 - x^2, 1 - y^2 and the last two times x and y, which vanish at the corners but for the first three.
-const TERMS: usize = 9;
+/// Of a component of `q`, by their order from 0 to 5: only the first three do not vanish at the corners.
+const ORDERS: [usize; 6] = [1, 2, 2, 4, 5, 6];
+const TERMS: usize = 20;
 const PARAMETERS: usize = 1 + 2 * TERMS;
-/// Prior sigma of the terms of third order: k1 = 0.3 displaces by this times the cube of half a side, over the square of the picture's width.
-const BEND_CUBIC: f64 = 0.3;
+type State = SVector<f64, PARAMETERS>;
+/// Prior sigma of `g`, px: none, but that sides alone do not tell it.
+const GROWN_PX: f64 = 100.0;
+/// Places of a side that say how it is bent, from -1 to 1.
+const ALONG: [f64; 7] = [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9];
+/// Edges are looked for again where they are expected by more than this elsewhere, px, and how often.
+const ELSEWHERE_PX: f64 = 0.5;
+const MOST_LOOKS: usize = 5;
 /// By how much code and outline of the tags of a picture differ in their growth, in common: px, and as a share of it. Fits of short edges to
 /// encoded steps said up to 3 % more than those of the long sides.
 const UNLIKE_PX: f64 = 0.01;
@@ -67,6 +75,8 @@ pub struct Outlined<'a> {
     pub variance: f64,
     /// Median step of its sides, counts.
     pub contrast: f64,
+    /// Bottom, right, top and left as printed.
+    pub sides: &'a [Measured; 4],
 }
 
 impl Outlined<'_> {
@@ -75,57 +85,101 @@ impl Outlined<'_> {
         let n = self.printed.reader.side() as f64;
         let unit = [[0.0, n], [n, n], [n, 0.0], [0.0, 0.0]];
         let map = PlaneMap::fit(&unit.into_iter().zip(self.corners).collect::<Vec<_>>())?;
-        let measured = |edge: &CodeEdge| {
-            let line = edge.fit(picture, &map, self.printed)?;
+        let measured = |edge: &CodeEdge, smooth: &State| {
+            let expected = |at: [f64; 2]| terms(edge.axis, edge.to_light, at.map(|at| 2.0 * at / n - 1.0)).dot(smooth);
+            let line = edge.fit(picture, &map, self.printed, expected)?;
             let step = line.contrast() / self.contrast;
             let line = line.widened(variance_factor(line.blur_px(), smoothing_px));
-            (OTHER_STEP..1.0 / OTHER_STEP).contains(&step).then(|| Row::of(edge, &line, n))
+            let at = edge.middle();
+            let row = Row::of(
+                terms(edge.axis, edge.to_light, at.map(|at| 2.0 * at / n - 1.0)),
+                line.offset_from(map.apply(at)?),
+            );
+            (OTHER_STEP..1.0 / OTHER_STEP).contains(&step).then_some(row)
         };
-        let rows: Vec<Row> = code_edges(self.printed).iter().filter_map(measured).collect();
-        solve(&rows, &self.priors(picture)).filter(|_| rows.len() >= LEAST_EDGES)
+        let (edges, sides, priors) = (code_edges(self.printed), self.side_rows(&map, n), self.priors(picture));
+        let mut smooth = solve(&sides, &priors)?.0;
+        for _ in 0..MOST_LOOKS {
+            smooth[0] = 0.0;
+            let mut rows: Vec<Row> = edges.iter().filter_map(|edge| measured(edge, &smooth)).collect();
+            let count = rows.len();
+            rows.extend(sides.iter().copied());
+            let (state, variance) = solve(&rows, &priors).filter(|_| count >= LEAST_EDGES)?;
+            let mut moved = state - smooth;
+            moved[0] = 0.0;
+            if rows[..count].iter().all(|row| row.terms.dot(&moved).abs() < ELSEWHERE_PX) {
+                return Some(Growth { px: state[0], variance });
+            }
+            smooth = state;
+        }
+        None
+    }
+
+    /// How far the sides lie beside the lines between the corners.
+    fn side_rows(&self, map: &PlaneMap, n: f64) -> Vec<Row> {
+        let places = [(1, 1.0), (0, 1.0), (1, -1.0), (0, -1.0)];
+        let sides = self.sides.iter().zip(places).filter_map(|(side, place)| Some((side.as_ref().ok()?, place)));
+        let rows = sides.flat_map(|(side, (axis, out))| {
+            ALONG.into_iter().filter_map(move |along| {
+                let at = if axis == 0 { [out, along] } else { [along, out] };
+                let seen = map.apply(at.map(|at| 0.5 * n * (at + 1.0)))?;
+                Some(Row::of(terms(axis, out, at), side.offset_from(seen)))
+            })
+        });
+        rows.collect()
     }
 
     /// Prior variances of the terms of `q`, px^2.
     fn priors(&self, picture: &Picture) -> [f64; TERMS] {
         let half = (0..4).map(|k| distance(self.corners[k], self.corners[(k + 1) % 4])).sum::<f64>() / 8.0;
-        let second = bend(picture) * half * half;
-        let third = BEND_CUBIC * half * (half / picture.width.max(picture.height) as f64).powi(2);
-        let [second, third] = [second * second, third * third];
-        let first = self.variance;
-        [first, first, first, second, second, third, third, third, third]
+        let bent = (2..).zip(bends(picture)).map(|(order, bend)| (bend * half.powi(order)).powi(2));
+        let of_orders = [self.variance; 2].into_iter().chain(bent);
+        let all = ORDERS.into_iter().zip(of_orders).flat_map(|(count, variance)| std::iter::repeat_n(variance, count));
+        let mut priors = [0.0; TERMS];
+        priors.iter_mut().zip(all).for_each(|(prior, variance)| *prior = variance);
+        priors
     }
 }
 
-/// What one edge of the code says.
+/// What `r` is made of, of an edge across an axis at a place from -1 to 1.
+fn terms(axis: usize, to_light: f64, [x, y]: [f64; 2]) -> State {
+    let (bow_x, bow_y) = (1.0 - x * x, 1.0 - y * y);
+    let (xx, xy, yy) = (bow_x * bow_x, bow_x * bow_y, bow_y * bow_y);
+    let first = [1.0, x, y];
+    let third = [bow_x, bow_y, x * bow_x, x * bow_y, y * bow_x, y * bow_y];
+    let fifth = [xx, xy, yy, x * y * bow_x, x * y * bow_y, x * xx, x * xy, x * yy, y * xx, y * xy, y * yy];
+    let smooth = first.into_iter().chain(third).chain(fifth);
+    let mut terms = State::zeros();
+    terms[0] = 1.0 - to_light * [x, y][axis];
+    for (k, term) in smooth.enumerate() {
+        terms[1 + axis * TERMS + k] = to_light * term;
+    }
+    terms
+}
+
+/// What one edge of the code says, or one place of a side.
+#[derive(Clone, Copy)]
 struct Row {
-    terms: SVector<f64, PARAMETERS>,
+    terms: State,
     off_px: f64,
     variance: f64,
 }
 
 impl Row {
-    fn of(edge: &CodeEdge, line: &EdgeLine, n: f64) -> Self {
-        let [x, y] = edge.middle().map(|at| 2.0 * at / n - 1.0);
-        let (bow_x, bow_y) = (1.0 - x * x, 1.0 - y * y);
-        let smooth = [1.0, x, y, bow_x, bow_y, x * bow_x, x * bow_y, y * bow_x, y * bow_y];
-        let mut terms = SVector::zeros();
-        terms[0] = 1.0 - edge.to_light * [x, y][edge.axis];
-        for (k, term) in smooth.into_iter().enumerate() {
-            terms[1 + edge.axis * TERMS + k] = edge.to_light * term;
-        }
-        let (off_px, variance) = line.offset_at_middle();
+    fn of(terms: State, (off_px, variance): (f64, f64)) -> Self {
         Self { terms, off_px, variance: variance + SYSTEMATIC_PX * SYSTEMATIC_PX }
     }
 }
 
-/// Least squares with Huber's weights.
-fn solve(rows: &[Row], priors: &[f64; TERMS]) -> Option<Growth> {
-    let mut state = SVector::<f64, PARAMETERS>::zeros();
+/// Least squares with Huber's weights: all parameters, and the variance of the first.
+fn solve(rows: &[Row], priors: &[f64; TERMS]) -> Option<(State, f64)> {
+    let mut state = State::zeros();
     let mut variance = 0.0;
     for _ in 0..ROUNDS {
         let mut normal = SMatrix::<f64, PARAMETERS, PARAMETERS>::zeros();
-        let mut right = SVector::<f64, PARAMETERS>::zeros();
+        let mut right = State::zeros();
         let mut square = 0.0;
+        normal[(0, 0)] = GROWN_PX.powi(-2);
         for (k, prior) in priors.iter().chain(priors).enumerate() {
             normal[(k + 1, k + 1)] = prior.recip();
         }
@@ -139,10 +193,10 @@ fn solve(rows: &[Row], priors: &[f64; TERMS]) -> Option<Growth> {
         }
         let factor = normal.cholesky()?;
         state = factor.solve(&right);
-        let first = SVector::<f64, PARAMETERS>::ith(0, 1.0);
-        variance = factor.solve(&first)[0] * (square / rows.len() as f64).max(1.0);
+        let first = State::ith(0, 1.0);
+        variance = factor.solve(&first)[0] * (square / rows.len().max(1) as f64).max(1.0);
     }
-    (state[0].is_finite() && variance.is_finite()).then_some(Growth { px: state[0], variance })
+    (state[0].is_finite() && variance.is_finite()).then_some((state, variance))
 }
 
 /// What values of one tag say that scatter with this variance each, beside what print leaves; `None` without any.

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::beside::Printed;
 use super::code::{Reader, SURE_BITS};
-use super::edge_line::{EdgeLine, Measured, Side};
+use super::edge_line::{ENDS_SPARE_PX, EdgeLine, Measured, Side};
 use super::growth::{self, Growth, InPicture, Outlined};
 use super::layout::{Layout, Tagged};
 use super::misfit::Usual;
@@ -33,6 +33,9 @@ const NORMAL_MEDIAN: f64 = 1.4826;
 const NEAREST: usize = 6;
 /// How far a tag may be from where the others say, in sides of it: one neighbour extrapolates roughly.
 const OFF: f64 = 0.5;
+
+/// Times that sides are measured again between the corners that they have.
+const MOST_AGAIN: usize = 4;
 
 /// Corners of tags by their place on the plate, counter-clockwise from the bottom-left.
 type Found = BTreeMap<usize, Quad>;
@@ -263,17 +266,21 @@ impl<'a> Board<'a> {
         })
     }
 
-    /// The sides of a tag with these corners. Where its code shines through its border, once more with the corners that they have.
+    /// The sides of a tag with these corners. Where its code shines through its border, or its corners lie elsewhere, as those of bent sides
+    /// do, once more with the corners that they have.
     fn sides(&self, place: usize, corners: &Quad) -> [Measured; 4] {
-        let first = self.sides_from(place, corners);
-        if !first.iter().flatten().any(EdgeLine::is_lit) {
-            return first;
+        let (mut corners, mut sides) = (*corners, self.sides_from(place, corners));
+        for again in 0..MOST_AGAIN {
+            let found = [0, 1, 2, 3]
+                .map(|k: usize| crossing(sides[(k + 3) % 4], sides[k], corners[k]).map_or(corners[k], |(uv, _)| uv));
+            let is_elsewhere = (0..4).any(|k| distance(found[k], corners[k]) > ENDS_SPARE_PX);
+            let is_lit = again == 0 && sides.iter().flatten().any(EdgeLine::is_lit);
+            if !is_elsewhere && !is_lit {
+                break;
+            }
+            (corners, sides) = (found, self.sides_from(place, &found));
         }
-        let corner = |k: usize| Some(crossing(first[(k + 3) % 4], first[k], corners[k]).ok()?.0);
-        match [corner(0), corner(1), corner(2), corner(3)] {
-            [Some(a), Some(b), Some(c), Some(d)] => self.sides_from(place, &[a, b, c, d]),
-            _ => first,
-        }
+        sides
     }
 
     fn sides_from(&self, place: usize, corners: &Quad) -> [Measured; 4] {
@@ -311,7 +318,8 @@ impl<'a> Board<'a> {
             let contrast = median(four.iter().flatten().map(EdgeLine::contrast))?;
             let variance = corners.iter().map(|(_, c)| c[0] + c[2]).sum::<f64>() / 8.0;
             let printed = self.print_of(*place);
-            let tag = Outlined { printed: &printed, corners: corners.map(|(uv, _)| uv), variance, contrast };
+            let tag =
+                Outlined { printed: &printed, corners: corners.map(|(uv, _)| uv), variance, contrast, sides: four };
             Some((*place, tag.growth(self.picture, self.smoothing_px)?))
         };
         sides.iter().filter_map(of_code).collect()
