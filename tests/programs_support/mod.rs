@@ -268,5 +268,6 @@ pub fn findings(run: &Run) -> BTreeMap<String, (String, serde_json::Value)> {
     let one = |f: serde_json::Value| {
         (f["code"].as_str().unwrap().into(), (f["weight"].as_str().unwrap().into(), f["quantities"].clone()))
     };
-    all.into_iter().map(one).collect()
+    // Those of this run stand first.
+    all.into_iter().rev().map(one).collect()
 }
