@@ -332,8 +332,7 @@ fn correlations(
 }
 
 /// What to do where the size of a plate goes with a length of the robot.
-const MEASURE_THE_SIZE: &str =
-    "measure the distance of two far markers and give [scale] in plate.toml: no stop tells the size of the plate";
+const MEASURE_THE_SIZE: &str = "measure the distance of two far markers as exactly as you can ([scale] in plate.toml): no stop tells the size of the plate";
 
 /// Parameters of the robot that no series can tell, and what all others have to do with them.
 struct Silent<'a> {

@@ -307,7 +307,7 @@ impl Work<'_> {
         let mut targets: Vec<Target> = board.iter().map(|(cell, p)| self.target(*cell, p, guess)).collect();
         let mut camera = learn(self.picture, &mut targets, guess, levels.noise, &mut self.pixels);
         let (mut entries, mut refused) = (Vec::new(), Vec::new());
-        let mut bands = Bands::of(targets.len());
+        let mut bands = Bands::of(self.picture, targets.len());
         for (&cell, target) in board.keys().zip(targets) {
             match refine_steadily(self.picture, &target.start(&camera, 0.3), &mut self.pixels) {
                 Ok(fit) => {
@@ -317,7 +317,7 @@ impl Work<'_> {
                 Err(reason) => refused.push((cell, target, reason)),
             }
         }
-        camera.correlation = bands.correlation(self.picture);
+        camera.correlation = bands.correlation();
         bands.state(&camera.correlation, entries.iter_mut().map(|e: &mut Entry| &mut e.fit));
         if options.rescue {
             let rescued = self.rescue(board, &camera, dropped);

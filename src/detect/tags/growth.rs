@@ -31,15 +31,18 @@ const OTHER_STEP: f64 = 0.75;
 /// Residuals beyond so many sigmas count less, in proportion.
 const FAR_SIGMAS: f64 = 2.5;
 const ROUNDS: usize = 12;
+/// A solution that changes less has settled, px.
+const SETTLED_PX: f64 = 1e-5;
 /// Of a component of `q`, by their order from 0 to 5: only the first three do not vanish at the corners.
 const ORDERS: [usize; 6] = [1, 2, 2, 4, 5, 6];
 const TERMS: usize = 20;
-const PARAMETERS: usize = 1 + 2 * TERMS;
-type State = SVector<f64, PARAMETERS>;
+type Terms = SVector<f64, TERMS>;
 /// Prior sigma of `g`, px: none, but that sides alone do not tell it.
 const GROWN_PX: f64 = 100.0;
 /// Places of a side that say how it is bent, from -1 to 1.
 const ALONG: [f64; 7] = [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9];
+/// Coefficients of a side: so many of its places are independent.
+const OF_A_SIDE: f64 = 5.0;
 /// Edges are looked for again where they are expected by more than this elsewhere, px, and how often.
 const ELSEWHERE_PX: f64 = 0.5;
 const MOST_LOOKS: usize = 5;
@@ -85,32 +88,25 @@ impl Outlined<'_> {
         let n = self.printed.reader.side() as f64;
         let unit = [[0.0, n], [n, n], [n, 0.0], [0.0, 0.0]];
         let map = PlaneMap::fit(&unit.into_iter().zip(self.corners).collect::<Vec<_>>())?;
-        let measured = |edge: &CodeEdge, smooth: &State| {
-            let expected = |at: [f64; 2]| terms(edge.axis, edge.to_light, at.map(|at| 2.0 * at / n - 1.0)).dot(smooth);
-            let line = edge.fit(picture, &map, self.printed, expected)?;
+        let measured = |edge: &CodeEdge, q: &[Terms; 2]| {
+            let place = |at: [f64; 2]| Place::of(edge.axis, edge.to_light, at.map(|at| 2.0 * at / n - 1.0));
+            let line = edge.fit(picture, &map, self.printed, |at| place(at).smooth(q))?;
             let step = line.contrast() / self.contrast;
             let line = line.widened(variance_factor(line.blur_px(), smoothing_px));
             let at = edge.middle();
-            let row = Row::of(
-                terms(edge.axis, edge.to_light, at.map(|at| 2.0 * at / n - 1.0)),
-                line.offset_from(map.apply(at)?),
-            );
+            let row = Row::of(place(at), line.offset_from(map.apply(at)?));
             (OTHER_STEP..1.0 / OTHER_STEP).contains(&step).then_some(row)
         };
         let (edges, sides, priors) = (code_edges(self.printed), self.side_rows(&map, n), self.priors(picture));
-        let mut smooth = solve(&sides, &priors)?.0;
+        let mut q = solve(&[], &sides, &priors)?.0.q;
         for _ in 0..MOST_LOOKS {
-            smooth[0] = 0.0;
-            let mut rows: Vec<Row> = edges.iter().filter_map(|edge| measured(edge, &smooth)).collect();
-            let count = rows.len();
-            rows.extend(sides.iter().copied());
-            let (state, variance) = solve(&rows, &priors).filter(|_| count >= LEAST_EDGES)?;
-            let mut moved = state - smooth;
-            moved[0] = 0.0;
-            if rows[..count].iter().all(|row| row.terms.dot(&moved).abs() < ELSEWHERE_PX) {
-                return Some(Growth { px: state[0], variance });
+            let code: Vec<Row> = edges.iter().filter_map(|edge| measured(edge, &q)).collect();
+            let (state, variance) = solve(&code, &sides, &priors).filter(|_| code.len() >= LEAST_EDGES)?;
+            let moved = [state.q[0] - q[0], state.q[1] - q[1]];
+            if code.iter().all(|row| row.place.smooth(&moved).abs() < ELSEWHERE_PX) {
+                return Some(Growth { px: state.grown, variance });
             }
-            smooth = state;
+            q = state.q;
         }
         None
     }
@@ -123,80 +119,132 @@ impl Outlined<'_> {
             ALONG.into_iter().filter_map(move |along| {
                 let at = if axis == 0 { [out, along] } else { [along, out] };
                 let seen = map.apply(at.map(|at| 0.5 * n * (at + 1.0)))?;
-                Some(Row::of(terms(axis, out, at), side.offset_from(seen)))
+                let (off_px, variance) = side.offset_from(seen);
+                let row = Row::of(Place::of(axis, out, at), (off_px, variance));
+                Some(Row { variance: row.variance * ALONG.len() as f64 / OF_A_SIDE, ..row })
             })
         });
         rows.collect()
     }
 
     /// Prior variances of the terms of `q`, px^2.
-    fn priors(&self, picture: &Picture) -> [f64; TERMS] {
+    fn priors(&self, picture: &Picture) -> Terms {
         let half = (0..4).map(|k| distance(self.corners[k], self.corners[(k + 1) % 4])).sum::<f64>() / 8.0;
         let bent = (2..).zip(bends(picture)).map(|(order, bend)| (bend * half.powi(order)).powi(2));
         let of_orders = [self.variance; 2].into_iter().chain(bent);
         let all = ORDERS.into_iter().zip(of_orders).flat_map(|(count, variance)| std::iter::repeat_n(variance, count));
-        let mut priors = [0.0; TERMS];
-        priors.iter_mut().zip(all).for_each(|(prior, variance)| *prior = variance);
-        priors
+        Terms::from_iterator(all)
     }
 }
 
-/// What `r` is made of, of an edge across an axis at a place from -1 to 1.
-fn terms(axis: usize, to_light: f64, [x, y]: [f64; 2]) -> State {
-    let (bow_x, bow_y) = (1.0 - x * x, 1.0 - y * y);
-    let (xx, xy, yy) = (bow_x * bow_x, bow_x * bow_y, bow_y * bow_y);
-    let first = [1.0, x, y];
-    let third = [bow_x, bow_y, x * bow_x, x * bow_y, y * bow_x, y * bow_y];
-    let fifth = [xx, xy, yy, x * y * bow_x, x * y * bow_y, x * xx, x * xy, x * yy, y * xx, y * xy, y * yy];
-    let smooth = first.into_iter().chain(third).chain(fifth);
-    let mut terms = State::zeros();
-    terms[0] = 1.0 - to_light * [x, y][axis];
-    for (k, term) in smooth.enumerate() {
-        terms[1 + axis * TERMS + k] = to_light * term;
+/// `g` and the coefficients of both components of `q`, px.
+#[derive(Clone, Copy)]
+struct State {
+    grown: f64,
+    q: [Terms; 2],
+}
+
+impl State {
+    const NOTHING: Self =
+        Self { grown: 0.0, q: [Terms::from_array_storage(nalgebra::ArrayStorage([[0.0; TERMS]])); 2] };
+
+    fn is_finite(&self) -> bool {
+        self.grown.is_finite() && self.q.iter().flatten().all(|c| c.is_finite())
     }
-    terms
+
+    /// Whether nothing differs by more than what counts.
+    fn is_settled(&self, before: &Self) -> bool {
+        let moved = self.q.iter().zip(&before.q).map(|(q, before)| (q - before).amax());
+        moved.chain([(self.grown - before.grown).abs()]).all(|moved| moved < SETTLED_PX)
+    }
+}
+
+/// What `r` is made of at a place: `1 - n.x`, and the terms of `n.q` in the component of `q` along `n`.
+#[derive(Clone, Copy)]
+struct Place {
+    axis: usize,
+    grown: f64,
+    terms: Terms,
+}
+
+impl Place {
+    /// Of an edge across an axis, at a place from -1 to 1.
+    fn of(axis: usize, to_light: f64, at: [f64; 2]) -> Self {
+        let [x, y] = at;
+        let (bow_x, bow_y) = (1.0 - x * x, 1.0 - y * y);
+        let (xx, xy, yy) = (bow_x * bow_x, bow_x * bow_y, bow_y * bow_y);
+        let first = [1.0, x, y];
+        let third = [bow_x, bow_y, x * bow_x, x * bow_y, y * bow_x, y * bow_y];
+        let fifth = [xx, xy, yy, x * y * bow_x, x * y * bow_y, x * xx, x * xy, x * yy, y * xx, y * xy, y * yy];
+        let terms = Terms::from_iterator(first.into_iter().chain(third).chain(fifth)) * to_light;
+        Self { axis, grown: 1.0 - to_light * at[axis], terms }
+    }
+
+    /// `n.q`, px.
+    fn smooth(&self, q: &[Terms; 2]) -> f64 {
+        self.terms.dot(&q[self.axis])
+    }
 }
 
 /// What one edge of the code says, or one place of a side.
 #[derive(Clone, Copy)]
 struct Row {
-    terms: State,
+    place: Place,
     off_px: f64,
     variance: f64,
 }
 
 impl Row {
-    fn of(terms: State, (off_px, variance): (f64, f64)) -> Self {
-        Self { terms, off_px, variance: variance + SYSTEMATIC_PX * SYSTEMATIC_PX }
+    fn of(place: Place, (off_px, variance): (f64, f64)) -> Self {
+        Self { place, off_px, variance: variance + SYSTEMATIC_PX * SYSTEMATIC_PX }
     }
 }
 
-/// Least squares with Huber's weights: all parameters, and the variance of the first.
-fn solve(rows: &[Row], priors: &[f64; TERMS]) -> Option<(State, f64)> {
-    let mut state = State::zeros();
-    let mut variance = 0.0;
+/// Normal equations of a component of `q`.
+#[derive(Clone, Copy)]
+struct Component {
+    normal: SMatrix<f64, TERMS, TERMS>,
+    with_grown: Terms,
+    right: Terms,
+}
+
+/// Least squares with Huber's weights: the state, and the variance of `g` by how well the edges of the code fit.
+fn solve(code: &[Row], sides: &[Row], priors: &Terms) -> Option<(State, f64)> {
+    let (mut state, mut variance) = (State::NOTHING, 0.0);
     for _ in 0..ROUNDS {
-        let mut normal = SMatrix::<f64, PARAMETERS, PARAMETERS>::zeros();
-        let mut right = State::zeros();
-        let mut square = 0.0;
-        normal[(0, 0)] = GROWN_PX.powi(-2);
-        for (k, prior) in priors.iter().chain(priors).enumerate() {
-            normal[(k + 1, k + 1)] = prior.recip();
-        }
-        for row in rows {
-            let sigmas = (row.off_px - row.terms.dot(&state)).abs() / row.variance.sqrt();
+        let of_prior = SMatrix::from_diagonal(&priors.map(f64::recip));
+        let mut components = [Component { normal: of_prior, with_grown: Terms::zeros(), right: Terms::zeros() }; 2];
+        let (mut normal, mut right, mut square) = (GROWN_PX.powi(-2), 0.0, 0.0);
+        for (k, Row { place, off_px, variance }) in code.iter().chain(sides).enumerate() {
+            let left = off_px - place.grown * state.grown - place.smooth(&state.q);
+            let sigmas = left.abs() / variance.sqrt();
             let far = if sigmas > FAR_SIGMAS { FAR_SIGMAS / sigmas } else { 1.0 };
-            let weight = far / row.variance;
-            normal += row.terms * row.terms.transpose() * weight;
-            right += row.terms * (row.off_px * weight);
-            square += far * sigmas * sigmas;
+            let weight = far / variance;
+            let of_q = &mut components[place.axis];
+            of_q.normal.ger(weight, &place.terms, &place.terms, 1.0);
+            of_q.with_grown.axpy(weight * place.grown, &place.terms, 1.0);
+            of_q.right.axpy(weight * off_px, &place.terms, 1.0);
+            normal += weight * place.grown * place.grown;
+            right += weight * place.grown * off_px;
+            if k < code.len() {
+                square += far * sigmas * sigmas;
+            }
         }
-        let factor = normal.cholesky()?;
-        state = factor.solve(&right);
-        let first = State::ith(0, 1.0);
-        variance = factor.solve(&first)[0] * (square / rows.len().max(1) as f64).max(1.0);
+        let [x, y] = components.map(|c| Some((c.normal.cholesky()?, c)));
+        let solved = [x?, y?].map(|(factor, c)| (factor.solve(&c.with_grown), factor.solve(&c.right), c));
+        for (with, alone, c) in &solved {
+            normal -= c.with_grown.dot(with);
+            right -= c.with_grown.dot(alone);
+        }
+        let grown = right / normal;
+        let before =
+            std::mem::replace(&mut state, State { grown, q: solved.map(|(with, alone, _)| alone - with * grown) });
+        variance = (square / code.len().max(1) as f64).max(1.0) / normal;
+        if state.is_settled(&before) {
+            break;
+        }
     }
-    (state[0].is_finite() && variance.is_finite()).then_some((state, variance))
+    (state.is_finite() && variance.is_finite()).then_some((state, variance))
 }
 
 /// What values of one tag say that scatter with this variance each, beside what print leaves; `None` without any.

@@ -251,15 +251,16 @@ impl Stops {
         let least = all.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?.clone();
         let equations: usize = self.all.iter().map(|s| s.candidates[0].e.len()).sum();
         let as_good = 2.0 * limits.decisive_log_odds * (least.cost / equations as f64).max(1.0);
+        let most = least.cost + as_good;
         let base = match from {
             Before::Nearest => least,
             Before::Fitted => {
                 let fitted = self.descended(vec![0; self.all.len()])?;
-                if fitted.cost <= least.cost + as_good { fitted } else { least }
+                if fitted.cost <= most { fitted } else { least }
             }
         };
         let mut best = vec![self.without_doubtful(base.postures, as_good)?];
-        for choice in all.into_iter().filter(|c| c.cost <= base.cost + as_good) {
+        for choice in all.into_iter().filter(|c| c.cost <= most) {
             let postures = self.without_doubtful(choice.postures, as_good)?;
             if !best.contains(&postures) {
                 best.push(postures);

@@ -20,6 +20,7 @@ const RESPONSES: f64 = 4.0;
 
 /// Bands of markers that were fitted for white noise.
 pub(in crate::detect::circles) struct Bands {
+    is_known: bool,
     astray: f64,
     /// Of how many markers that are taken one has its response computed.
     stride: usize,
@@ -31,18 +32,23 @@ pub(in crate::detect::circles) struct Bands {
 }
 
 impl Bands {
-    /// For so many markers.
-    pub fn of(markers: usize) -> Self {
+    /// For so many markers. The noise of a smoothed picture is known from what it was smoothed by, and in one of few grey levels what rounding adds
+    /// is known.
+    pub fn of(picture: &Picture, markers: usize) -> Self {
+        let is_known = picture.full_scale.is_infinite() || few_levels(picture).is_some();
         let markers = markers as f64;
         // Both coordinates are even over the range.
         let astray = (ASTRAY.1 * (ENOUGH / markers).sqrt()).clamp(ASTRAY.0, ASTRAY.1);
         let taken = markers * (astray / ASTRAY.1).powi(2);
         let stride = (taken / RESPONSES).ceil().max(1.0) as usize;
-        Self { astray, stride, influences: Vec::new(), left: Vec::new(), parts: Vec::new() }
+        Self { is_known, astray, stride, influences: Vec::new(), left: Vec::new(), parts: Vec::new() }
     }
 
     /// Takes the next marker, whose fit ended on these pixels.
     pub fn take(&mut self, fit: &Fit, pixels: &Pixels) {
+        if self.is_known {
+            return;
+        }
         let solved = pixels.solved.as_ref();
         self.influences.push(solved.map(|solved| OfCentres::of(solved, pixels)));
         let far = |c: f64| (2.0 * c - (2.0 * c).round()).abs() > self.astray;
@@ -58,10 +64,9 @@ impl Bands {
         self.left.push((fit.misfit, seen));
     }
 
-    /// Of the noise of neighbouring pixels. That of a smoothed picture is known from what it was smoothed by, and in one of few grey levels what
-    /// rounding adds is known.
-    pub fn correlation(&self, picture: &Picture) -> Correlation {
-        if picture.full_scale.is_infinite() || few_levels(picture).is_some() {
+    /// Of the noise of neighbouring pixels.
+    pub fn correlation(&self) -> Correlation {
+        if self.is_known {
             return Correlation::WHITE;
         }
         let most = DISTURBED * median(self.left.iter().map(|(misfit, _)| *misfit)).unwrap_or(0.0);

@@ -140,7 +140,7 @@ pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Drop
     let mut pixels = Pixels::default();
     let guess = median(candidates.iter().map(|c| c.blur_px)).unwrap_or(f64::NAN);
     let camera = learn(picture, &mut targets, guess, levels.noise, &mut pixels);
-    let (mut fits, mut bands) = (Vec::new(), Bands::of(targets.len()));
+    let (mut fits, mut bands) = (Vec::new(), Bands::of(picture, targets.len()));
     for target in &targets {
         match refine(picture, &target.start(&camera, 0.3), &mut pixels) {
             Ok(fit) => {
@@ -150,7 +150,7 @@ pub fn measure(picture: &Picture, options: &Options) -> (Vec<Measured>, Vec<Drop
             Err(reason) => dropped.push(drop_target(target, reason, None)),
         }
     }
-    bands.state(&bands.correlation(picture), fits.iter_mut());
+    bands.state(&bands.correlation(), fits.iter_mut());
     (fits.iter().map(|fit| fit.measured).collect(), dropped)
 }
 
