@@ -807,6 +807,17 @@ fn every_command_tries_its_folder_before_it_reads_anything() {
     assert_eq!(all_below(root.path()), before);
 }
 
+#[test]
+fn the_table_of_predictions_is_tried_before_anything_is_read() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    write_all(&out, &result(&["camera.yaml"], "old")).unwrap();
+    fs::write(out.join("at.csv"), "mine").unwrap();
+    let args = "identify --urdf missing --series missing --at missing.csv --at-unit deg --out out";
+    let (code, said) = robotcal(root.path(), &args.split(' ').collect::<Vec<_>>());
+    assert!(code == Some(2) && said.starts_with("error[output_exists]: "), "{said}");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_read_only_disk_is_named_before_the_work() {
