@@ -543,6 +543,12 @@ fn files_that_no_record_names_are_kept_under_another_name() {
     ["second", "third"].iter().for_each(|content| write(content).unwrap());
     let expected = [("at.csv", "third"), ("at.csv.kept-1", "by hand")];
     assert_eq!(all_below(&out), expected.map(|(n, c)| (n.to_owned(), table(c).into_bytes())).into());
+    // No name is left to keep it.
+    fs::remove_file(out.join(WRITTEN)).unwrap();
+    (2..1000).for_each(|k| fs::write(out.join(format!("at.csv.kept-{k}")), "").unwrap());
+    let before = all_below(&out);
+    assert_eq!(write("fourth").unwrap_err().code, Code::OutputExists);
+    assert!(all_below(&out) == before);
 }
 
 #[test]
