@@ -226,7 +226,7 @@ impl ResultFolder {
             Standing::Others => Err(Error::new(
                 Code::OutputExists,
                 self.given.join(name).display(),
-                "is there already, and is not what this program wrote there",
+                "is there already, and no hash on record says that it is as this program wrote it",
                 format!("name another place for the result ({}), or move this file away", self.option),
             )),
             standing => Ok(Some(standing)),
