@@ -389,6 +389,32 @@ fn what_the_user_puts_there_meanwhile_stays() {
     assert_eq!(names(root.path()), ["out"]);
 }
 
+#[test]
+fn what_is_changed_during_the_run_is_left_alone() {
+    let solutions = two_results();
+    let plans = ["planned", "planned again"].map(plan);
+    for (record, [old, new], changed) in [
+        ("solution.json", &solutions, "robot.urdf"),
+        ("plan.json", &plans, "joints.csv"),
+        ("plan.json", &plans, "images"),
+    ] {
+        let root = tempfile::tempdir().unwrap();
+        let out = root.path().join("out");
+        write_all(&out, old).unwrap();
+        let result = ResultFolder::claim(&out, record).unwrap().begin().unwrap();
+        new.iter().for_each(|(name, bytes)| result.put(name, bytes).unwrap());
+        match changed {
+            "images" => fs::create_dir(out.join(changed)).unwrap(),
+            _ => fs::write(out.join(changed), "by hand").unwrap(),
+        }
+        let before = all_below(&out);
+        assert_eq!(result.finish().unwrap_err().code, Code::OutputForeign, "{changed}");
+        assert_eq!(all_below(&out), before, "{changed}");
+        assert_eq!(&all_below(&root.path().join("out-2")), new, "{changed}");
+        assert_eq!(names(root.path()), ["out", "out-2"]);
+    }
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn names_that_are_no_text_stay() {
