@@ -415,6 +415,46 @@ fn what_is_changed_during_the_run_is_left_alone() {
     }
 }
 
+/// Of an earlier version, or copied without the hashes.
+#[test]
+fn files_of_a_result_without_hashes_are_kept_in_one_folder_beside_it() {
+    let [old, new] = two_results();
+    for by_exchange in [true, false] {
+        let root = tempfile::tempdir().unwrap();
+        let [out, first, second] = ["out", "out.kept-1", "out.kept-2"].map(|name| root.path().join(name));
+        write_all(&out, &old).unwrap();
+        if !by_exchange {
+            fs::create_dir(out.join("pictures")).unwrap();
+        }
+        let without_hashes = |files: &Files| {
+            fs::remove_file(out.join(WRITTEN)).unwrap();
+            write_all(&out, files).unwrap();
+            assert_eq!(&all_below(&out), files);
+            names(root.path())
+        };
+        assert_eq!(without_hashes(&old), ["out"], "nothing is another file");
+        fs::write(out.join("robot.urdf"), "by hand").unwrap();
+        assert_eq!(without_hashes(&old), ["out", "out.kept-1"]);
+        assert_eq!(all_below(&first), Files::from([("robot.urdf".to_owned(), b"by hand".to_vec())]));
+        // Everything is another file: pictures and records are not what people edit.
+        assert_eq!(without_hashes(&new), ["out", "out.kept-1", "out.kept-2"]);
+        let edited = old.iter().filter(|(name, _)| ["yaml", "csv", "urdf"].iter().any(|e| name.ends_with(e)));
+        assert_eq!(all_below(&second), edited.map(|(n, b)| (n.clone(), b.clone())).collect());
+        write_all(&out, &old).unwrap();
+        assert_eq!(names(root.path()), ["out", "out.kept-1", "out.kept-2"], "it has hashes now");
+    }
+}
+
+#[test]
+fn hashes_in_the_record_of_a_plan_are_enough() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("run1");
+    write_all(&out, &plan("planned")).unwrap();
+    fs::remove_file(out.join(WRITTEN)).unwrap();
+    write_all(&out, &plan("planned again")).unwrap();
+    assert_eq!(names(root.path()), ["run1"]);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn names_that_are_no_text_stay() {
@@ -757,6 +797,21 @@ fn a_mount_point_gets_the_result_file_by_file() {
     assert_eq!(all_below(&root.path().join("copy")), two_results()[1]);
     assert_eq!(all_below(&root.path().join("kept")), two_results()[1]);
     assert_eq!(names(root.path()), ["copy", "kept", "out"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn where_no_folder_can_be_made_beside_files_are_kept_within() {
+    let root = tempfile::tempdir().unwrap();
+    fs::create_dir(root.path().join("disk")).unwrap();
+    let script = "mount -t tmpfs none disk; mkdir disk/out; mount -t tmpfs none disk/out; mount -o remount,ro disk; \
+                  export ROUNDS=1 RESULTS_GO_TO=disk/out; $CHILD >&2; rm disk/out/.robotcal-written.json; \
+                  printf 'by hand' > disk/out/robot.urdf; $CHILD >&2; cp -a disk/out copy";
+    let Some(ended) = with_mounts(script, root.path()) else { return };
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let mut expected = two_results()[0].clone();
+    expected.insert("earlier/robot.urdf".into(), b"by hand".to_vec());
+    assert_eq!(all_below(&root.path().join("copy")), expected);
 }
 
 #[cfg(target_os = "linux")]

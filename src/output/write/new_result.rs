@@ -10,7 +10,7 @@ use super::own::{self, WRITTEN, sha256_of};
 use super::place::ResultFolder;
 use super::staging::Staging;
 use super::tree::write_synced;
-use super::{journal, swap, tree};
+use super::{journal, kept, swap, tree};
 use crate::error::{Code, Error, Result};
 
 impl ResultFolder {
@@ -83,6 +83,7 @@ impl NewResult {
             let what = "was changed or put there since the earlier result, and would be lost";
             return Err(set_aside(&staging, target, Path::new(&used), what));
         }
+        kept::keep_unrecorded(target, &there.unrecorded, staging.path()).map_err(io)?;
         tree::sync_below(staging.path());
         if let Staging::Beside(new) = &staging {
             match swap::swap(target, new, &there.foreign) {
