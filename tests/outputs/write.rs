@@ -389,6 +389,72 @@ fn what_the_user_puts_there_meanwhile_stays() {
     assert_eq!(names(root.path()), ["out"]);
 }
 
+#[test]
+fn what_is_changed_during_the_run_is_left_alone() {
+    let solutions = two_results();
+    let plans = ["planned", "planned again"].map(plan);
+    for (record, [old, new], changed) in [
+        ("solution.json", &solutions, "robot.urdf"),
+        ("plan.json", &plans, "joints.csv"),
+        ("plan.json", &plans, "images"),
+    ] {
+        let root = tempfile::tempdir().unwrap();
+        let out = root.path().join("out");
+        write_all(&out, old).unwrap();
+        let result = ResultFolder::claim(&out, record).unwrap().begin().unwrap();
+        new.iter().for_each(|(name, bytes)| result.put(name, bytes).unwrap());
+        match changed {
+            "images" => fs::create_dir(out.join(changed)).unwrap(),
+            _ => fs::write(out.join(changed), "by hand").unwrap(),
+        }
+        let before = all_below(&out);
+        assert_eq!(result.finish().unwrap_err().code, Code::OutputForeign, "{changed}");
+        assert_eq!(all_below(&out), before, "{changed}");
+        assert_eq!(&all_below(&root.path().join("out-2")), new, "{changed}");
+        assert_eq!(names(root.path()), ["out", "out-2"]);
+    }
+}
+
+/// Of an earlier version, or copied without the hashes.
+#[test]
+fn files_of_a_result_without_hashes_are_kept_in_one_folder_beside_it() {
+    let [old, new] = two_results();
+    for by_exchange in [true, false] {
+        let root = tempfile::tempdir().unwrap();
+        let [out, first, second] = ["out", "out.kept-1", "out.kept-2"].map(|name| root.path().join(name));
+        write_all(&out, &old).unwrap();
+        if !by_exchange {
+            fs::create_dir(out.join("pictures")).unwrap();
+        }
+        let without_hashes = |files: &Files| {
+            fs::remove_file(out.join(WRITTEN)).unwrap();
+            write_all(&out, files).unwrap();
+            assert_eq!(&all_below(&out), files);
+            names(root.path())
+        };
+        assert_eq!(without_hashes(&old), ["out"], "nothing is another file");
+        fs::write(out.join("robot.urdf"), "by hand").unwrap();
+        assert_eq!(without_hashes(&old), ["out", "out.kept-1"]);
+        assert_eq!(all_below(&first), Files::from([("robot.urdf".to_owned(), b"by hand".to_vec())]));
+        // Everything is another file: pictures and records are not what people edit.
+        assert_eq!(without_hashes(&new), ["out", "out.kept-1", "out.kept-2"]);
+        let edited = old.iter().filter(|(name, _)| ["yaml", "csv", "urdf"].iter().any(|e| name.ends_with(e)));
+        assert_eq!(all_below(&second), edited.map(|(n, b)| (n.clone(), b.clone())).collect());
+        write_all(&out, &old).unwrap();
+        assert_eq!(names(root.path()), ["out", "out.kept-1", "out.kept-2"], "it has hashes now");
+    }
+}
+
+#[test]
+fn hashes_in_the_record_of_a_plan_are_enough() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("run1");
+    write_all(&out, &plan("planned")).unwrap();
+    fs::remove_file(out.join(WRITTEN)).unwrap();
+    write_all(&out, &plan("planned again")).unwrap();
+    assert_eq!(names(root.path()), ["run1"]);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn names_that_are_no_text_stay() {
@@ -528,6 +594,10 @@ fn files_among_others_are_known_by_what_was_written() {
     fs::remove_file(out.join("p.png")).unwrap();
     write("third").unwrap();
     assert!(all_below(&out).values().all(|bytes| bytes == b"third"));
+    // It may be of an earlier version, which kept no hashes.
+    fs::write(out.join("old.png"), "of an earlier version").unwrap();
+    let error = write_beside(&out, &[("old.png".to_owned(), &b"fourth"[..])], &[]).unwrap_err();
+    assert_eq!(error.code, Code::OutputExists, "{error}");
 }
 
 /// Of earlier versions, or moved there.
@@ -543,6 +613,12 @@ fn files_that_no_record_names_are_kept_under_another_name() {
     ["second", "third"].iter().for_each(|content| write(content).unwrap());
     let expected = [("at.csv", "third"), ("at.csv.kept-1", "by hand")];
     assert_eq!(all_below(&out), expected.map(|(n, c)| (n.to_owned(), table(c).into_bytes())).into());
+    // No name is left to keep it.
+    fs::remove_file(out.join(WRITTEN)).unwrap();
+    (2..1000).for_each(|k| fs::write(out.join(format!("at.csv.kept-{k}")), "").unwrap());
+    let before = all_below(&out);
+    assert_eq!(write("fourth").unwrap_err().code, Code::OutputExists);
+    assert!(all_below(&out) == before);
 }
 
 #[test]
@@ -725,6 +801,21 @@ fn a_mount_point_gets_the_result_file_by_file() {
 
 #[cfg(target_os = "linux")]
 #[test]
+fn where_no_folder_can_be_made_beside_files_are_kept_within() {
+    let root = tempfile::tempdir().unwrap();
+    fs::create_dir(root.path().join("disk")).unwrap();
+    let script = "mount -t tmpfs none disk; mkdir disk/out; mount -t tmpfs none disk/out; mount -o remount,ro disk; \
+                  export ROUNDS=1 RESULTS_GO_TO=disk/out; $CHILD >&2; rm disk/out/.robotcal-written.json; \
+                  printf 'by hand' > disk/out/robot.urdf; $CHILD >&2; cp -a disk/out copy";
+    let Some(ended) = with_mounts(script, root.path()) else { return };
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let mut expected = two_results()[0].clone();
+    expected.insert("earlier/robot.urdf".into(), b"by hand".to_vec());
+    assert_eq!(all_below(&root.path().join("copy")), expected);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
 fn a_full_disk_keeps_the_earlier_result() {
     let root = tempfile::tempdir().unwrap();
     fs::create_dir(root.path().join("disk")).unwrap();
@@ -805,6 +896,17 @@ fn every_command_tries_its_folder_before_it_reads_anything() {
     let (code, said) = robotcal(root.path(), &["convert", "missing.mcap", file]);
     assert!(code == Some(2) && said.starts_with(&format!("error[output_name]: {file}")), "{said}");
     assert_eq!(all_below(root.path()), before);
+}
+
+#[test]
+fn the_table_of_predictions_is_tried_before_anything_is_read() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    write_all(&out, &result(&["camera.yaml"], "old")).unwrap();
+    fs::write(out.join("at.csv"), "mine").unwrap();
+    let args = "identify --urdf missing --series missing --at missing.csv --at-unit deg --out out";
+    let (code, said) = robotcal(root.path(), &args.split(' ').collect::<Vec<_>>());
+    assert!(code == Some(2) && said.starts_with("error[output_exists]: "), "{said}");
 }
 
 #[cfg(target_os = "linux")]

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::output::flange_table::{at_csv, flange_at, relative_to};
 use crate::output::restore::{entered_offsets, exported_model};
 use crate::output::solution_json::SolutionRecord;
-use crate::output::write_beside;
+use crate::output::{ResultFolder, write_beside};
 use crate::urdf::Chain;
 
 /// Flags of `--at`.
@@ -29,7 +29,7 @@ pub(super) struct AtArgs {
 const MOST_ROWS: usize = 20;
 
 /// File of the predictions.
-pub(super) const AT: &str = "at.csv";
+const AT: &str = "at.csv";
 
 /// The joint vectors of `--at`, rad or m.
 pub(super) struct AtTable<'a> {
@@ -39,6 +39,17 @@ pub(super) struct AtTable<'a> {
 }
 
 impl AtArgs {
+    /// The place of a result, tried for the predictions as well.
+    ///
+    /// # Errors
+    /// A file of their name that somebody else made.
+    pub(super) fn place(&self, place: ResultFolder) -> Result<ResultFolder> {
+        match self.at {
+            Some(_) => place.for_files(&[AT]),
+            None => Ok(place),
+        }
+    }
+
     /// The table, read before the work whose result it asks; nothing without `--at`.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde::Deserialize;
 
-use super::at::{AT, AtArgs, AtTable};
+use super::at::{AtArgs, AtTable};
 use super::show::{read_solution, read_solution_with_bytes};
 use super::{long_table, summary};
 use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
@@ -118,7 +118,7 @@ impl From<TwoStage> for Estimator {
 }
 
 pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
-    let claim = |folder: &Path| ResultFolder::claim(folder, FILE_NAME);
+    let claim = |folder: &Path| args.at.place(ResultFolder::claim(folder, FILE_NAME)?);
     // Tried before the work that the result costs.
     let mut place = args.out.as_deref().filter(|_| !args.dry_run).map(claim).transpose()?;
     let earlier = args.from.as_deref().map(read_solution).transpose()?;
@@ -157,10 +157,6 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let place = place.ok_or_else(|| {
         Error::new(Code::OptionMissing, "identify", "no folder for the results is given", "give --out")
     })?;
-    let place = match at.is_some() {
-        true => place.for_files(&[AT])?,
-        false => place,
-    };
     let estimator = args.two_stage.map_or(options.estimator, Into::into);
     let of_cameras = args.cameras.apply(&mut observed.series)?;
     observed.notices.extend(of_cameras);

@@ -6,6 +6,7 @@
 
 mod held;
 mod journal;
+mod kept;
 mod new_result;
 mod own;
 mod place;

@@ -10,7 +10,7 @@ use super::own::{self, WRITTEN, sha256_of};
 use super::place::ResultFolder;
 use super::staging::Staging;
 use super::tree::write_synced;
-use super::{journal, swap, tree};
+use super::{journal, kept, swap, tree};
 use crate::error::{Code, Error, Result};
 
 impl ResultFolder {
@@ -64,8 +64,8 @@ impl NewResult {
     /// Puts the result in the place of the earlier one.
     ///
     /// # Errors
-    /// When it cannot be moved there: the earlier one is kept. Where a file of the user is in the way, the new one is put
-    /// beside, and the error says where.
+    /// When it cannot be moved there: the earlier one is kept. Where a file of the user is in the way, or one of the earlier result was
+    /// changed meanwhile, the new one is put beside, and the error says where.
     pub fn finish(self) -> Result<()> {
         let Self { place, hashes, staging } = self;
         let hashes = hashes.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -76,8 +76,14 @@ impl NewResult {
         let names: BTreeSet<String> = hashes.into_keys().chain([WRITTEN.to_owned()]).collect();
         let there = tree::there(target, &names).map_err(io)?;
         if let Some(file) = there.in_the_way(&names) {
-            return Err(set_aside(&staging, target, file));
+            return Err(set_aside(&staging, target, file, IN_THE_WAY));
         }
+        // As it was claimed, long ago perhaps.
+        if let Some(used) = tree::used_since(target) {
+            let what = "was changed or put there since the earlier result, and would be lost";
+            return Err(set_aside(&staging, target, Path::new(&used), what));
+        }
+        kept::keep_unrecorded(target, &there.unrecorded, staging.path()).map_err(io)?;
         tree::sync_below(staging.path());
         if let Staging::Beside(new) = &staging {
             match swap::swap(target, new, &there.foreign) {
@@ -129,22 +135,24 @@ impl NewFolder {
         let names: BTreeSet<String> = listed.filter_map(|e| e.ok()?.file_name().into_string().ok()).collect();
         let there = tree::there(target, &BTreeSet::new()).map_err(fail)?;
         if let Some(file) = there.in_the_way(&names) {
-            return Err(set_aside(&staging, target, file));
+            return Err(set_aside(&staging, target, file, IN_THE_WAY));
         }
         let _inside = staging.inside(target, &names)?;
         journal::commit(target, &names, &[])
     }
 }
 
-/// Moves a result that has no place to where it can be found.
-fn set_aside(staging: &Staging, target: &Path, in_the_way: &Path) -> Error {
+/// What is said of a file that stands where a new one goes.
+const IN_THE_WAY: &str = "would be overwritten, but is not of the earlier result in this folder";
+
+/// Moves a result that has no place, because `file` is what is said of it, to where it can be found.
+fn set_aside(staging: &Staging, target: &Path, file: &Path, what: &str) -> Error {
     let name = target.file_name().map_or_else(|| "result".into(), |n| n.to_string_lossy());
     let candidate = |k: u32| match staging {
         Staging::Beside(_) => target.with_file_name(format!("{name}-{k}")),
         Staging::Inside(_) => target.join(format!("result-{k}")),
     };
-    let place = target.join(in_the_way);
-    let what = "would be overwritten, but is not of the earlier result in this folder";
+    let place = target.join(file);
     let aside = (2..1000).map(candidate).find(|p| !p.exists());
     match aside.filter(|aside| fs::rename(staging.path(), aside).is_ok()) {
         Some(aside) => Error::new(

@@ -226,7 +226,7 @@ impl ResultFolder {
             Standing::Others => Err(Error::new(
                 Code::OutputExists,
                 self.given.join(name).display(),
-                "is there already, and is not what this program wrote there",
+                "is there already, and no hash on record says that it is as this program wrote it",
                 format!("name another place for the result ({}), or move this file away", self.option),
             )),
             standing => Ok(Some(standing)),
@@ -260,8 +260,14 @@ impl Drop for ResultFolder {
 
 /// Keeps a file that is to be replaced under another name, as somebody may have worked with it.
 fn keep(file: &Path) -> Result<()> {
-    let kept = free_name(file.to_path_buf());
-    fs::copy(file, &kept).map_err(|e| Error::io(&kept, &e))?;
+    let kept = free_name(file.to_path_buf()).map_err(|_| {
+        let what = "would be kept under another name, and all of them are taken";
+        Error::new(Code::OutputExists, file.display(), what, "move it and those of its name with .kept- away")
+    })?;
+    fs::read(file).and_then(|bytes| write_synced(&kept, &bytes)).map_err(|e| Error::io(&kept, &e))?;
+    if let Some(folder) = kept.parent() {
+        tree::sync(folder);
+    }
     tracing::warn!(
         "{}: no record says whether it was changed since it was written; it is kept as {}",
         file.display(),

@@ -107,7 +107,7 @@ pub(super) fn sweep(stray: &Path, target: &Path, own: &BTreeSet<String>) -> io::
             fs::remove_file(&from)
         } else {
             to.parent().map_or(Ok(()), fs::create_dir_all)?;
-            fs::rename(&from, free_name(to))
+            fs::rename(&from, free_name(to)?)
         }
     };
     others.iter().try_for_each(clear)?;
@@ -119,11 +119,14 @@ pub(super) fn sweep(stray: &Path, target: &Path, own: &BTreeSet<String>) -> io::
 }
 
 /// The path itself, or another name where it is taken.
-pub(super) fn free_name(path: PathBuf) -> PathBuf {
+///
+/// # Errors
+/// Where all others are taken, too.
+pub(super) fn free_name(path: PathBuf) -> io::Result<PathBuf> {
     let is_free = |p: &PathBuf| p.symlink_metadata().is_err();
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let others = (1..1000).map(|k| path.with_file_name(format!("{name}.kept-{k}")));
-    std::iter::once(path.clone()).chain(others).find(is_free).unwrap_or(path)
+    std::iter::once(path.clone()).chain(others).find(is_free).ok_or_else(|| io::ErrorKind::AlreadyExists.into())
 }
 
 #[cfg(unix)]

@@ -30,6 +30,8 @@ pub(super) const UNFINISHED: &str = ".robotcal-unfinished";
 pub(super) struct There {
     /// Files of the earlier result that the new one does not have.
     pub stale: Vec<String>,
+    /// Files of the earlier result of which no hash is known.
+    pub unrecorded: Vec<String>,
     /// What the program did not write: files, and folders as a whole.
     pub foreign: Vec<PathBuf>,
 }
@@ -45,12 +47,18 @@ impl There {
 /// Looks at the target of a result with these names.
 pub(super) fn there(target: &Path, names: &BTreeSet<String>) -> io::Result<There> {
     let own = own_files(target);
+    let known: BTreeSet<String> = hashes(target).into_iter().map(|(file, _)| file).collect();
     let mut there = There::default();
     for entry in entries(target, &folders(own.iter().chain(names)))? {
-        match entry.to_str().filter(|e| own.contains(*e)) {
-            Some(own) if !names.contains(own) => there.stale.push(own.to_owned()),
-            Some(_) => {}
-            None => there.foreign.push(entry),
+        let Some(file) = entry.to_str().filter(|e| own.contains(*e)) else {
+            there.foreign.push(entry);
+            continue;
+        };
+        if !names.contains(file) {
+            there.stale.push(file.to_owned());
+        }
+        if !known.contains(file) {
+            there.unrecorded.push(file.to_owned());
         }
     }
     Ok(there)
@@ -92,22 +100,27 @@ pub(super) fn other_record(target: &Path, own: &str) -> Option<&'static str> {
     RECORDS.into_iter().find(|record| *record != own && target.join(record).symlink_metadata().is_ok())
 }
 
-/// A file of an earlier result that is not what its record says was written, or what was put there to be used with it.
-pub(super) fn used_since(target: &Path) -> Option<String> {
+/// SHA-256 of files of an earlier result, by name, as its record and that of the folder hold them.
+fn hashes(target: &Path) -> Vec<(String, String)> {
     #[derive(Deserialize)]
     struct Listed {
         #[serde(default)]
         as_written: BTreeMap<String, String>,
     }
     let read = |record: &str| serde_json::from_slice::<Listed>(&fs::read(target.join(record)).ok()?).ok();
+    let listed = SERIES.into_iter().filter_map(read);
+    let own = earlier_files(target).unwrap_or_default();
+    let written = own::written(target).into_iter().filter(|(file, _)| own.contains(file));
+    listed.flat_map(|l| l.as_written).chain(written).collect()
+}
+
+/// A file of an earlier result that is not what its record says was written, or what was put there to be used with it.
+pub(super) fn used_since(target: &Path) -> Option<String> {
     let is_other = |(file, sha256): &(String, String)| {
         let path = target.join(file);
         path.exists() && InputFile::of_file(&path).is_ok_and(|now| now.sha256 != *sha256)
     };
-    let listed = SERIES.into_iter().filter_map(read);
-    let own = earlier_files(target).unwrap_or_default();
-    let written = own::written(target).into_iter().filter(|(file, _)| own.contains(file));
-    let changed = listed.flat_map(|l| l.as_written).chain(written).find(is_other).map(|(file, _)| file);
+    let changed = hashes(target).into_iter().find(is_other).map(|(file, _)| file);
     let is_series = || SERIES.iter().any(|record| target.join(record).exists()) && target.join(IMAGES).exists();
     changed.or_else(|| is_series().then(|| IMAGES.to_owned()))
 }
