@@ -107,7 +107,8 @@ fn reading(
     for file in files.iter().enumerate() {
         task.assignments(reader(file)?);
         Task::look_for_calls(&mut references, reader(file)?);
-        task.switching.look_through(reader(file)?);
+        let is_known = |name: &str| task.data.contains_key(name);
+        task.switching.look_through(reader(file)?, is_known);
     }
     task.changed_by_calls(&references);
     for file in files.iter().enumerate() {
