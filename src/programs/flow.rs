@@ -14,8 +14,6 @@ const MOST_READINGS: usize = 24;
 /// Why something is not known.
 const BRANCHES: &str = "it is set in a branch or a loop";
 const CALLS: &str = "it is not the same at all calls of the routine";
-/// The part of a routine that never returns.
-const NEVER: &str = "never returns";
 
 /// All that statements set.
 pub(super) trait Followed: Clone + PartialEq {
@@ -312,19 +310,6 @@ impl<T: Followed> Flow<T> {
     pub fn returns(&mut self, now: &T) {
         self.ends_with(now);
         self.goes_elsewhere();
-    }
-
-    /// The innermost routine does not reach its end, nor does it return elsewhere.
-    pub fn never_returns(&mut self, now: &T) {
-        if let Some(routine) = self.routines.last().filter(|routine| routine.end.is_none()) {
-            self.passes(&part_name(&routine.name, NEVER), now);
-        }
-    }
-
-    /// True for a routine of the files that never returns.
-    pub fn is_endless(&self, name: &str) -> bool {
-        let meant = self.meant(name);
-        !meant.is_empty() && meant.iter().all(|name| self.passed(&part_name(name, NEVER)).is_some())
     }
 
     /// What follows is reached by a jump alone.

@@ -3,7 +3,7 @@
 //! In a loop that depends on targets further on in the text. So the targets are gone through until nothing new is found: a target of which nothing
 //! is known yet says nothing of those that are reached from it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use super::posture::{Before, Finder, Known, same_posture};
 use super::program::{Approach, Arrival, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
@@ -41,20 +41,7 @@ pub(super) struct Meant {
 enum Found {
     Nothing,
     Meant(Box<Meant>, Approach),
-    Left(Cause),
-}
-
-/// Why a target stays as it is.
-enum Cause {
-    Why(Why),
-    /// It leaves out an external axis, and nothing tells where that stands: a reading.
-    AxisUntold(usize),
-}
-
-impl From<Why> for Cause {
-    fn from(why: Why) -> Self {
-        Self::Why(why)
-    }
+    Left(Why),
 }
 
 /// What all targets of a program mean to the controller; `held` readings keep the value of the program.
@@ -76,17 +63,16 @@ pub(super) fn meant(
         finder,
         stays,
         found,
-        followed: BTreeMap::new(),
+        followed: BTreeSet::new(),
         has_more: false,
     };
     while meaning.finds_more() || meaning.begins_anywhere() {}
-    let words: Vec<Option<Why>> = (0..targets.len()).map(|k| meaning.axis_untold(k)).collect();
-    let one = |(found, untold)| match (found, untold) {
-        (Found::Meant(meant, _), _) => Ok(*meant),
-        (Found::Left(Cause::Why(why)), _) | (_, Some(why)) => Err(why),
-        (Found::Left(Cause::AxisUntold(_)) | Found::Nothing, None) => Err(unreached()),
+    let one = |found| match found {
+        Found::Meant(meant, _) => Ok(*meant),
+        Found::Left(why) => Err(why),
+        Found::Nothing => Err(unreached()),
     };
-    meaning.found.into_iter().zip(words).map(one).collect()
+    meaning.found.into_iter().map(one).collect()
 }
 
 fn unreached() -> Why {
@@ -121,9 +107,9 @@ struct Meaning<'a> {
     /// True for readings that the program puts nowhere else than at `--start`; without that, nowhere.
     stays: Vec<bool>,
     found: Vec<Found>,
-    /// The ways that were followed, by where they begin: to which target, and the number of the arrival.
-    followed: BTreeMap<Approach, BTreeSet<(usize, usize)>>,
-    /// True where a way was followed, or must be once more, since this was asked.
+    /// Targets with the ways that were followed: the number of the arrival, and where it begins.
+    followed: BTreeSet<(usize, usize, Approach)>,
+    /// True where a way was followed since this was asked.
     has_more: bool,
 }
 
@@ -187,7 +173,7 @@ impl Meaning<'_> {
         match &self.found[k] {
             Found::Nothing => {}
             Found::Meant(..) => _ = all.insert(from),
-            Found::Left(cause) if self.loses_posture(k, cause) => _ = all.insert(Approach::Unknown),
+            Found::Left(why) if self.loses_posture(k, why) => _ = all.insert(Approach::Unknown),
             Found::Left(_) if through.insert(k) => {
                 self.arrivals[k].iter().for_each(|a| self.origins(a.from.beyond(), through, all));
             }
@@ -196,22 +182,21 @@ impl Meaning<'_> {
     }
 
     /// True where the robot stands in a posture of its own at a target that is left.
-    fn loses_posture(&self, k: usize, cause: &Cause) -> bool {
-        let is_unknown = matches!(cause, Cause::Why(why) if why.reason == LeftReason::PostureUnknown);
-        is_unknown || matches!(self.targets[k].kind, TargetKind::Joints(_))
+    fn loses_posture(&self, k: usize, why: &Why) -> bool {
+        why.reason == LeftReason::PostureUnknown || matches!(self.targets[k].kind, TargetKind::Joints(_))
     }
 
     /// Follows a way to a target, unless that was done: what it means must be what the others say.
     fn follow(&mut self, k: usize, n: usize, origin: Approach) {
-        if !self.followed.entry(origin).or_default().insert((k, n)) {
+        if !self.followed.insert((k, n, origin)) {
             return;
         }
         self.has_more = true;
         let new = self.by(k, n, origin);
         match (new, &self.found[k]) {
-            (Err(cause), _) => self.found[k] = Found::Left(cause),
+            (Err(why), _) => self.found[k] = Found::Left(why),
             (Ok(new), Found::Meant(known, first)) if !same_posture(&known.readings, &new.readings) => {
-                self.found[k] = Found::Left(self.differing(k, *first, origin).into());
+                self.found[k] = Found::Left(self.differing(k, *first, origin));
             }
             (Ok(new), Found::Nothing) => self.found[k] = Found::Meant(Box::new(new), origin),
             (Ok(new), _) => self.tells_no_more(k, &new.told),
@@ -224,8 +209,7 @@ impl Meaning<'_> {
         let least: Vec<Told> = known.told.iter().zip(told).map(|(known, told)| *known.min(told)).collect();
         if least != known.told {
             known.told = least;
-            [Approach::From(k), Approach::Beyond(k)].iter().for_each(|origin| _ = self.followed.remove(origin));
-            self.has_more = true;
+            self.followed.retain(|(_, _, origin)| origin.target() != Some(k));
         }
     }
 
@@ -243,7 +227,7 @@ impl Meaning<'_> {
     }
 
     /// What a target means to a robot that comes from there.
-    fn by(&mut self, k: usize, n: usize, origin: Approach) -> Result<Meant, Cause> {
+    fn by(&mut self, k: usize, n: usize, origin: Approach) -> Understood<Meant> {
         let before = origin.target().and_then(|j| match &self.found[j] {
             Found::Meant(meant, _) => Some(&**meant),
             _ => None,
@@ -309,20 +293,19 @@ impl Meaning<'_> {
         })
     }
 
-    /// Why a pose stays as it is that leaves out an external axis of which nothing tells where it stands; all ways to it are known by now.
-    fn axis_untold(&self, k: usize) -> Option<Why> {
-        let Found::Left(Cause::AxisUntold(reading)) = self.found[k] else { return None };
+    /// Why a pose stays as it is that leaves out an external axis of which nothing tells where it stands.
+    fn axis_untold(&self, k: usize, reading: usize) -> Why {
         let name = &self.controller.chain.readings[reading];
         let gives_start = self.finder.start(reading).is_none() && self.start_would_tell(k, reading);
         let remedy = if gives_start { ", or give --start" } else { "" };
         let words = format!(
             "it leaves out {name}, and nothing tells where that stands (write its place in the target{remedy})"
         );
-        Some(Why::new(LeftReason::Incomplete, words))
+        Why::new(LeftReason::Incomplete, words)
     }
 
     /// The target with what its text leaves out, which is what the target before it says.
-    fn completed(&self, k: usize, before: Option<&Meant>, origin: Approach) -> Result<TargetKind, Cause> {
+    fn completed(&self, k: usize, before: Option<&Meant>, origin: Approach) -> Understood<TargetKind> {
         let unknown =
             || Why::new(LeftReason::Incomplete, "it leaves numbers out, and the target before it is not known");
         let mut kind = self.targets[k].kind.clone();
@@ -341,12 +324,11 @@ impl Meaning<'_> {
                 for (i, place) in pose.fixed.iter_mut().enumerate() {
                     if place.is_some_and(|value| !value.is_finite()) {
                         let kept = before.filter(|b| b.told[i] == Told::Yes).map(|b| b.readings[i]);
-                        *place = Some(kept.or(self.by_start(i, origin)).ok_or(Cause::AxisUntold(i))?);
+                        *place = Some(kept.or(self.by_start(i, origin)).ok_or_else(|| self.axis_untold(k, i))?);
                     }
                 }
                 if pose.is_partial() {
-                    let is_told = |b: &&Meant| b.told.iter().all(|told| *told == Told::Yes);
-                    let before = before.filter(is_told).ok_or_else(unknown)?;
+                    let before = before.ok_or_else(unknown)?;
                     pose.complete(&self.controller.base_from_tip(&before.readings));
                 }
             }

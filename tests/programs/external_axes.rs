@@ -251,10 +251,6 @@ fn the_first_target_of_main_has_the_rail_of_its_end_in_all_cycles_but_the_first(
     let robot = on_rail();
     let go = format!("MoveL {},v10,fine,tool0;\n", robtarget(&pose(&robot, 0.5), "9E9"));
     let at = |eax: &str| format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget(eax));
-    let forever = |more: &str| {
-        let away = at("700");
-        format!("ENDPROC\nPROC rInit()\n{away}ENDPROC\nPROC rLoop()\nWHILE TRUE DO\n{away}{more}ENDWHILE\n")
-    };
     for (body, counts) in [
         (go.clone(), true),
         (format!("{go}{}", at("500")), true),
@@ -268,62 +264,9 @@ fn the_first_target_of_main_has_the_rail_of_its_end_in_all_cycles_but_the_first(
         (format!("{go}WHILE TRUE DO\nrOut;\nENDWHILE\nENDPROC\nPROC rOut()\n{}ExitCycle;\n", at("700")), false),
         (format!("{go}{}Stop;\nEXIT;\n", at("700")), true),
         (format!("{}{go}{}", at("500"), at("700")), true),
-        (format!("{go}rInit;\nrLoop;\n{}", forever("")), true),
-        (format!("{go}rInit;\nrLoop;\n{}", forever("IF a=1 RETURN;\n")), false),
-        (format!("{go}rInit;\nIF a=1 THEN\nrLoop;\nENDIF\n{}", forever("")), false),
-        (format!("{go}rInit;\nrLoop;\nERROR\nTRYNEXT;\n{}", forever("")), false),
-        (format!("{go}rInit;\nrOuter;\nENDPROC\nPROC rOuter()\nrLoop;\n{}", forever("")), true),
     ] {
         let text = module(&body);
         assert_eq!(is_met(&robot, "m.mod", &text), counts, "{text}");
-    }
-}
-
-/// Instructions hold on until others end them, also where `main` begins again.
-#[test]
-fn what_the_end_of_main_leaves_switched_holds_where_it_begins_again() {
-    let robot = on_rail();
-    let target = robtarget(&pose(&robot, 0.5), "500,0,0,0,0,0").replace(",9E9,9E9,9E9,9E9,9E9]", "]");
-    let alone = "IndAMove STN1,1\\ToAbsNum:=560,20;\n";
-    let displaced = "PDispSet [[100,0,0],[1,0,0,0],[0,0,0],[0,0,0]];\n";
-    let offset = "EOffsSet [100,0,0,0,0,0];\n";
-    for (end, reason) in [
-        (String::new(), None),
-        (alone.to_owned(), Some(LeftReason::ExternalAxis)),
-        (format!("{alone}IndReset STN1,1;\n"), None),
-        (format!("{alone}EXIT;\n"), None),
-        (format!("rEnd;\nENDPROC\nPROC rEnd()\n{alone}"), Some(LeftReason::ExternalAxis)),
-        (displaced.to_owned(), Some(LeftReason::FrameUnknown)),
-        (format!("{displaced}PDispOff;\n"), None),
-        (offset.to_owned(), Some(LeftReason::ExternalAxis)),
-        (format!("{offset}EOffsOff;\n"), None),
-    ] {
-        let text = module(&format!("MoveL {target},v10,fine,tool0;\n{end}"));
-        let found = corrected(&robot, "m.mod", &text, Some(0.5));
-        assert_eq!(found[&first_line(&text, "MoveL")].as_ref().err(), reason.as_ref(), "{text}");
-    }
-}
-
-/// Behind axis angles that leave the rail out, the numbers that a pose leaves out are told only where the rail is.
-#[test]
-fn a_partial_pose_is_completed_only_where_the_rail_before_it_is_told() {
-    let robot = on_rail();
-    let q: Vec<f64> = std::iter::once(0.5).chain(START).collect();
-    let z_mm = 1e3 * Robot::nominal(robot.0.clone()).base_from_tip(&q).xyz()[2];
-    let lin = format!("LIN {{Z {:.7},E1 500.0}}\n", z_mm + 5.0);
-    let [arm, told] = ["", ",E1 500.0"].map(|more| format!("PTP {}\n", axes(more)));
-    for (before, start, is_met) in [
-        (told.clone(), None, true),
-        (format!("{told}{arm}"), None, true),
-        (arm.clone(), Some(0.5), true),
-        (arm.clone(), None, false),
-        (format!("PICK()\n{arm}"), Some(0.5), false),
-        (format!("{told}PICK()\n{arm}"), None, false),
-    ] {
-        let text = format!("{BEGIN}{before}{lin}END\n");
-        let found = corrected(&robot, "a.src", &text, start);
-        let reason = found[&first_line(&text, "LIN")].as_ref().err();
-        assert_eq!(reason, (!is_met).then_some(&LeftReason::Incomplete), "{text}");
     }
 }
 
@@ -361,8 +304,6 @@ fn start_is_offered_where_it_would_tell_the_rail() {
         (format!("PICK()\n{lin}"), false),
         (format!("PTP XHOME\n{arm}{lin}"), false),
         (format!("IF $IN[1] THEN\nPTP XHOME\nENDIF\n{arm}{lin}"), false),
-        // The way from the end of the loop is found later.
-        (format!("WHILE $IN[1]\n{lin}PTP XHOME\n{arm}ENDWHILE\n"), false),
     ] {
         let text = format!("{BEGIN}{body}END\n");
         let all = words(&robot, "a.src", &text);
@@ -386,25 +327,6 @@ fn the_end_of_a_circle_does_not_take_the_rail_from_the_point_on_it() {
         let text = module(&format!("{head_mod}MoveC {},{},v10,fine,tool0;\n", tool(on_circle), tool(end)));
         let left = read_program(&robot.0, &[1, 2, 3, 4, 5, 6, 0], "m.mod", &text).left;
         assert_eq!(left.iter().any(|l| l.why.reason == LeftReason::Incomplete), is_left, "{text}");
-    }
-}
-
-/// An end of which the text does not tell where it stands does not leave the rail out.
-#[test]
-fn the_end_of_a_circle_that_is_computed_or_an_element_leaves_nothing_out() {
-    let robot = on_rail();
-    let at = |eax: &str| robtarget(&pose(&robot, 0.5), eax);
-    let data = format!("CONST robtarget pEnds{{2}}:=[{},{}];\nVAR robtarget pLater;\nPROC q()\n", at("500"), at("500"));
-    for (end, reason) in [
-        ("pEnds{i}", None),
-        ("pNone", Some(LeftReason::Undeclared)),
-        ("pLater", Some(LeftReason::Computed)),
-        ("CalcRobT(j,tool0)", Some(LeftReason::Computed)),
-    ] {
-        let body = format!("MoveC {},{end},v10,fine,tool0;\nENDPROC\n{data}", at("500"));
-        let left = read_program(&robot.0, &[1, 2, 3, 4, 5, 6, 0], "m.mod", &module(&body)).left;
-        let reasons: Vec<LeftReason> = left.iter().map(|left| left.why.reason).collect();
-        assert_eq!(reasons, Vec::from_iter(reason), "{body}");
     }
 }
 

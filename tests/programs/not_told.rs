@@ -191,9 +191,6 @@ fn poses_that_leave_out_an_external_axis_are_left_where_it_may_stand_elsewhere_t
         (format!("{there}{far}"), 1, 1),
         // A variable of that name is no axis.
         (format!("DECL INT N,E1\n{there}sub(1,E1)\n"), 1, 0),
-        // What moves external axes to where no file tells has moved one; what ends such a motion moves none that the files put nowhere.
-        (format!("ASYPTP XPARK\n{there}"), 0, 1),
-        (format!("ASYSTOP\nASYCANCEL 1\n{there}"), 1, 0),
     ] {
         let src = |body: &str| format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{body}END\n");
         let found = told(&cell, &[("a.src", src(&body))], &[&start]);
@@ -215,9 +212,6 @@ fn poses_that_leave_out_an_external_axis_are_left_where_it_may_stand_elsewhere_t
         (format!("{}{}WaitTime 1;\nSetDO do1,1;\nn:=1;\n{there}", at("500"), at("0")), 3, 0),
         (format!("IndAMove STN1,1\\ToAbsNum:=90,20;\n{there}"), 0, 1),
         (format!("{}sub;\nENDPROC\nPROC sub()\n{there}", at("500")), 1, 1),
-        (format!("MoveExtJ jExt,vrot10,fine;\n{there}"), 0, 1),
-        (format!("SearchExtJ di1,jFound,jExt,vrot10;\n{there}"), 0, 1),
-        (format!("rPick;\n{there}"), 1, 0),
     ] {
         let text = format!("MODULE m\nPROC main()\nConfJ\\Off;\n{body}ENDPROC\nENDMODULE\n");
         let found = told(&cell, &[("m.mod", text.clone())], &[&start]);

@@ -24,9 +24,6 @@ pub(super) fn look_through(all: &mut PutAnywhere, mut reader: Reader<'_>) {
             _ => {}
         }
         let name = reader.name().unwrap_or_default();
-        if name == ASYNCHRONOUS && !reader.ahead_is_mark(1, b'{') {
-            all.note_all();
-        }
         let axis = external_axis(&name);
         let is_element = [b'{', b',', b':'].iter().any(|mark| reader.ahead_is_mark(-1, *mark));
         let is_in_list = is_element && open.last() == Some(&b'{');

@@ -1,5 +1,4 @@
-//! The controller runs `main` again from its end, until it is stopped (ABB, *Operating manual*, run mode Continuous), with what its instructions have
-//! switched (ABB, *Technical reference manual RAPID Instructions, Functions and Data types*, `ExitCycle`).
+//! The controller runs `main` again from its end, until it is stopped (ABB, *Operating manual*, run mode Continuous).
 
 /// Stands for what holds where `main` begins again; no routine has a blank in its name.
 pub(super) const AGAIN: &str = "main again";
@@ -9,7 +8,7 @@ pub(super) const AGAIN: &str = "main again";
 pub(super) struct Cycle {
     /// True in `main` where no other routine calls it.
     pub is_main: bool,
-    /// True behind a loop that never ends, or a call of a routine with one: the end of the routine is not reached.
+    /// True behind a loop that never ends: the end of the routine is not reached.
     pub is_endless: bool,
     /// Branches and loops that are open.
     pub depth: usize,
@@ -21,7 +20,7 @@ impl Cycle {
         *self = Self { is_main, ..Self::default() };
     }
 
-    /// A loop begins, which never ends (`WHILE TRUE DO`), or does; or a routine is called that never returns, or does.
+    /// A loop begins, which never ends (`WHILE TRUE DO`), or does.
     pub fn loops(&mut self, forever: bool) {
         self.is_endless |= forever && self.depth == 0;
     }

@@ -107,8 +107,7 @@ fn reading(
     for file in files.iter().enumerate() {
         task.assignments(reader(file)?);
         Task::look_for_calls(&mut references, reader(file)?);
-        let is_known = |name: &str| task.data.contains_key(name);
-        task.switching.look_through(reader(file)?, is_known);
+        task.switching.look_through(reader(file)?);
     }
     task.changed_by_calls(&references);
     for file in files.iter().enumerate() {

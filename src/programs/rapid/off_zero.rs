@@ -1,6 +1,5 @@
 //! Where targets, and assignments to them, put external axes.
 
-use super::switched::INDEPENDENT;
 use super::value::{Node, node};
 use crate::programs::external::{NO_AXIS, PutAnywhere};
 use crate::programs::scan::{Reader, TokenKind};
@@ -14,20 +13,8 @@ pub(super) fn places(target: &Node) -> Option<Vec<(usize, Option<f64>)>> {
     Some(all.filter(|(_, place)| place.is_none_or(|value| value < NO_AXIS)).collect())
 }
 
-/// Instructions that move external axes alone: to a target, and until a signal comes on the way to one.
-const MOVES: &str = "MOVEEXTJ";
-const SEARCHES: &str = "SEARCHEXTJ";
 /// The external axes of a target.
 const EXTERNAL: &str = "EXTAX";
-
-/// True on the name of an instruction that moves external axes to where no text tells: `is_known` for names of data of the files.
-pub(super) fn moves_untold(reader: &Reader<'_>, is_known: impl Fn(&str) -> bool) -> bool {
-    let Some(name) = reader.name() else { return false };
-    let ends = |k: &usize| reader.token(*k).is_none_or(|t| t.kind == TokenKind::Mark(b';'));
-    let is_told = |k: usize| reader.token_is_mark(k, b'[') || reader.name_of(k).is_some_and(|name| is_known(&name));
-    let goes_there = || (reader.at + 1..).take_while(|k| !ends(k)).any(is_told);
-    name == SEARCHES || INDEPENDENT.contains(&name.as_str()) || (name == MOVES && !goes_there())
-}
 
 /// Notes where a target, or an assignment to one of them, puts external axes where the reader stands.
 pub(super) fn external_axes(all: &mut PutAnywhere, reader: &mut Reader<'_>) {

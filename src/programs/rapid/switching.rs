@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::cycle::{AGAIN, Cycle};
-use super::off_zero::{external_axes, moves_untold};
+use super::off_zero::external_axes;
 use super::switched::{
     DISPLACES, INDEPENDENT, INDEPENDENT_ENDS, OFFSETS, Switched, Watched, locks, named_axis, switch,
 };
@@ -142,7 +142,7 @@ impl Switching {
     }
 
     /// Which checks of configurations are switched off anywhere in a text, and whether a displacement is begun.
-    pub fn look_through(&mut self, mut reader: Reader<'_>, is_known: impl Fn(&str) -> bool) {
+    pub fn look_through(&mut self, mut reader: Reader<'_>) {
         self.flow.file_begins(reader.index);
         while !reader.done() {
             if let Some((which, Watched::Off)) = switch(&reader) {
@@ -156,7 +156,7 @@ impl Switching {
             let is_independent = name.as_ref().is_some_and(|word| INDEPENDENT.contains(&word.as_str()));
             self.independents.extend(is_independent.then(|| named_axis(&reader)));
             external_axes(&mut self.put_anywhere, &mut reader);
-            if moves_untold(&reader, &is_known) {
+            if is_independent {
                 self.put_anywhere.note_all();
             }
             connected(&reader).iter().for_each(|trap| self.connected.extend(self.flow.meant(trap)));
@@ -196,10 +196,8 @@ impl Switching {
                 self.now = self.now.merged(&uncalled, "");
                 self.cycle.begins(is_main && !self.flow.is_called(&routine_name(reader)));
                 if self.cycle.is_main {
-                    self.now.1 = Stands::begin();
-                    if let Some((left, stands)) = self.flow.passed(AGAIN) {
-                        self.now = self.now.merged(&(left.at_top(), stands.clone()), "");
-                    }
+                    let again = self.flow.passed(AGAIN).map(|(_, stands)| stands.merged(&Stands::begin(), ""));
+                    self.now.1 = again.unwrap_or_else(Stands::begin);
                 }
                 self.top = self.now.0.clone();
                 (self.handler, self.may_have_failed) = (None, false);
@@ -211,9 +209,8 @@ impl Switching {
             "ENDPROC" | "ENDFUNC" | "ENDTRAP" => {
                 let is_endless = self.cycle.is_endless && self.handler.is_none();
                 self.part_ends();
-                match is_endless {
-                    true => self.flow.never_returns(&self.now),
-                    false => self.begins_again(),
+                if !is_endless {
+                    self.begins_again();
                 }
                 self.flow.routine_ends(&mut self.now);
             }
@@ -240,11 +237,7 @@ impl Switching {
                 }
             }
             "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => self.branches_end(way),
-            _ => {
-                self.step(reader, word, way);
-                let fails_on = self.flow.behind_part(TRY_NEXT, &self.now).is_some();
-                self.cycle.loops(!fails_on && self.flow.is_endless(word));
-            }
+            _ => self.step(reader, word, way),
         }
         self.top.note(&self.now.0);
     }
