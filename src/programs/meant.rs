@@ -328,7 +328,8 @@ impl Meaning<'_> {
                     }
                 }
                 if pose.is_partial() {
-                    let before = before.ok_or_else(unknown)?;
+                    let is_told = |b: &&Meant| b.told.iter().all(|told| *told == Told::Yes);
+                    let before = before.filter(is_told).ok_or_else(unknown)?;
                     pose.complete(&self.controller.base_from_tip(&before.readings));
                 }
             }

@@ -270,6 +270,29 @@ fn the_first_target_of_main_has_the_rail_of_its_end_in_all_cycles_but_the_first(
     }
 }
 
+/// Behind axis angles that leave the rail out, the numbers that a pose leaves out are told only where the rail is.
+#[test]
+fn a_partial_pose_is_completed_only_where_the_rail_before_it_is_told() {
+    let robot = on_rail();
+    let q: Vec<f64> = std::iter::once(0.5).chain(START).collect();
+    let z_mm = 1e3 * Robot::nominal(robot.0.clone()).base_from_tip(&q).xyz()[2];
+    let lin = format!("LIN {{Z {:.7},E1 500.0}}\n", z_mm + 5.0);
+    let [arm, told] = ["", ",E1 500.0"].map(|more| format!("PTP {}\n", axes(more)));
+    for (before, start, is_met) in [
+        (told.clone(), None, true),
+        (format!("{told}{arm}"), None, true),
+        (arm.clone(), Some(0.5), true),
+        (arm.clone(), None, false),
+        (format!("PICK()\n{arm}"), Some(0.5), false),
+        (format!("{told}PICK()\n{arm}"), None, false),
+    ] {
+        let text = format!("{BEGIN}{before}{lin}END\n");
+        let found = corrected(&robot, "a.src", &text, start);
+        let reason = found[&first_line(&text, "LIN")].as_ref().err();
+        assert_eq!(reason, (!is_met).then_some(&LeftReason::Incomplete), "{text}");
+    }
+}
+
 /// A target of axis angles that leaves the rail out does not tell where it stands, if one way to it does not.
 #[test]
 fn the_rail_is_told_behind_a_joint_target_only_where_all_ways_to_it_tell_it() {
