@@ -357,8 +357,7 @@ fn solved(response: &Response, group: &Group) -> Solved {
         scatter += (w * &direction).dot(&direction) / value;
         degrees += 1;
     }
-    let uneven = scatter * response.equations as f64 / (degrees.max(1) as f64 * response.squares);
-    let uneven = if uneven > 1.0 { uneven } else { 1.0 };
+    let uneven = (scatter * response.equations as f64 / (degrees.max(1) as f64 * response.squares)).max(1.0);
     // One step from a large fault may take more than there is.
     let taken = (statistic / response.squares).min(1.0 - f64::EPSILON);
     let removed = taken * (response.squares - degrees as f64).max(1.0) / (1.0 - taken);

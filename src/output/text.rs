@@ -1,19 +1,18 @@
 //! Numbers, names and records as YAML, TOML, CSV and JSON want them.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use serde::Serialize;
 
 use crate::error::{Code, Error, Result};
-use crate::series::InputFile;
+use crate::series::sha256;
 
 /// Files of a series that people complete by hand.
 const COMPLETED: [&str; 4] = ["joints.csv", "series.toml", "plate.toml", "plate.csv"];
 
 /// SHA-256 of the files of a series among these, as they are written: a result that was worked with is not replaced.
 pub(super) fn as_written(files: &BTreeMap<String, Vec<u8>>) -> BTreeMap<String, String> {
-    let hash = |name: &str| Some((name.to_owned(), InputFile::of_bytes(Path::new(name), files.get(name)?).sha256));
+    let hash = |name: &str| Some((name.to_owned(), sha256(files.get(name)?)));
     COMPLETED.into_iter().filter_map(hash).collect()
 }
 

@@ -9,7 +9,7 @@ use super::reason::Why;
 pub(super) const NO_AXIS: f64 = 9e9;
 
 /// Axes of the arm in the languages of programs; those behind them are external.
-const ARM_AXES: usize = 6;
+pub(super) const ARM_AXES: usize = 6;
 /// External axes of KRL (`E1` to `E6`) and of RAPID (`eax_a` to `eax_f`).
 const EXTERNAL_AXES: usize = 6;
 

@@ -3,7 +3,7 @@
 //! In a loop that depends on targets further on in the text. So the targets are gone through until nothing new is found: a target of which nothing
 //! is known yet says nothing of those that are reached from it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::posture::{Before, Finder, Known, same_posture};
 use super::program::{Approach, Arrival, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
@@ -63,7 +63,7 @@ pub(super) fn meant(
         finder,
         stays,
         found,
-        followed: BTreeSet::new(),
+        followed: BTreeMap::new(),
         has_more: false,
     };
     while meaning.finds_more() || meaning.begins_anywhere() {}
@@ -107,8 +107,8 @@ struct Meaning<'a> {
     /// True for readings that the program puts nowhere else than at `--start`; without that, nowhere.
     stays: Vec<bool>,
     found: Vec<Found>,
-    /// Targets with the ways that were followed: the number of the arrival, and where it begins.
-    followed: BTreeSet<(usize, usize, Approach)>,
+    /// Ways that were followed, by the target from which they come: the target, the number of the arrival, and where it begins.
+    followed: BTreeMap<Option<usize>, BTreeSet<(usize, usize, Approach)>>,
     /// True where a way was followed since this was asked.
     has_more: bool,
 }
@@ -188,7 +188,7 @@ impl Meaning<'_> {
 
     /// Follows a way to a target, unless that was done: what it means must be what the others say.
     fn follow(&mut self, k: usize, n: usize, origin: Approach) {
-        if !self.followed.insert((k, n, origin)) {
+        if !self.followed.entry(origin.target()).or_default().insert((k, n, origin)) {
             return;
         }
         self.has_more = true;
@@ -209,7 +209,7 @@ impl Meaning<'_> {
         let least: Vec<Told> = known.told.iter().zip(told).map(|(known, told)| *known.min(told)).collect();
         if least != known.told {
             known.told = least;
-            self.followed.retain(|(_, _, origin)| origin.target() != Some(k));
+            self.followed.remove(&Some(k));
         }
     }
 

@@ -1,5 +1,6 @@
 //! What the text of a program alone does not say.
 
+use super::external::ARM_AXES;
 use crate::geom::Pose;
 use crate::urdf::Chain;
 
@@ -20,4 +21,11 @@ pub struct ProgramSetting<'a> {
     pub work: Option<Pose>,
     /// True where external axes that the chain lacks move neither robot nor work.
     pub axes_apart: bool,
+}
+
+impl ProgramSetting<'_> {
+    /// External axes that the chain has.
+    pub(super) fn external_axes(&self) -> usize {
+        self.axes.len().saturating_sub(ARM_AXES)
+    }
 }

@@ -20,11 +20,7 @@ pub struct InputFile {
 impl InputFile {
     /// A file whose bytes are at hand.
     pub fn of_bytes(path: &Path, bytes: &[u8]) -> Self {
-        Self::of_digest(path, &Sha256::digest(bytes))
-    }
-
-    fn of_digest(path: &Path, digest: &[u8]) -> Self {
-        Self { path: path.to_path_buf(), sha256: digest.iter().map(|b| format!("{b:02x}")).collect() }
+        Self { path: path.to_path_buf(), sha256: sha256(bytes) }
     }
 
     /// Hashes a file of any length, as long as it was when it was opened.
@@ -38,11 +34,20 @@ impl InputFile {
         let mut buffer = vec![0; 1 << 20];
         loop {
             match file.read(&mut buffer).map_err(|e| Error::io(path, &e))? {
-                0 => return Ok(Self::of_digest(path, &hasher.finalize())),
+                0 => return Ok(Self { path: path.to_path_buf(), sha256: hexadecimal(&hasher.finalize()) }),
                 read => hasher.update(&buffer[..read]),
             }
         }
     }
+}
+
+/// SHA-256, lower-case hexadecimal.
+pub fn sha256(bytes: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+fn hexadecimal(digest: &[u8]) -> String {
+    digest.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// Reads a text file without its byte order mark and notes its hash.

@@ -77,7 +77,7 @@ impl Unfollowed {
         // Of the odd part a pixel and that opposite say the same.
         let chi2 = 0.5 * self.beyond.dot(&self.right);
         let part = 1.0 - (UNKNOWN as f64 - 2.0) / chi2.max(f64::MIN_POSITIVE);
-        if part > 0.0 { self.counting(part) } else { self.counting(0.0) }
+        self.counting(part.max(0.0))
     }
 
     fn counting(&self, part: f64) -> Correlation {

@@ -119,8 +119,7 @@ impl Outlined<'_> {
             ALONG.into_iter().filter_map(move |along| {
                 let at = if axis == 0 { [out, along] } else { [along, out] };
                 let seen = map.apply(at.map(|at| 0.5 * n * (at + 1.0)))?;
-                let (off_px, variance) = side.offset_from(seen);
-                let row = Row::of(Place::of(axis, out, at), (off_px, variance));
+                let row = Row::of(Place::of(axis, out, at), side.offset_from(seen));
                 Some(Row { variance: row.variance * ALONG.len() as f64 / OF_A_SIDE, ..row })
             })
         });
@@ -145,8 +144,9 @@ struct State {
 }
 
 impl State {
-    const NOTHING: Self =
-        Self { grown: 0.0, q: [Terms::from_array_storage(nalgebra::ArrayStorage([[0.0; TERMS]])); 2] };
+    fn nothing() -> Self {
+        Self { grown: 0.0, q: [Terms::zeros(); 2] }
+    }
 
     fn is_finite(&self) -> bool {
         self.grown.is_finite() && self.q.iter().flatten().all(|c| c.is_finite())
@@ -210,7 +210,7 @@ struct Component {
 
 /// Least squares with Huber's weights: the state, and the variance of `g` by how well the edges of the code fit.
 fn solve(code: &[Row], sides: &[Row], priors: &Terms) -> Option<(State, f64)> {
-    let (mut state, mut variance) = (State::NOTHING, 0.0);
+    let (mut state, mut variance) = (State::nothing(), 0.0);
     for _ in 0..ROUNDS {
         let of_prior = SMatrix::from_diagonal(&priors.map(f64::recip));
         let mut components = [Component { normal: of_prior, with_grown: Terms::zeros(), right: Terms::zeros() }; 2];

@@ -10,7 +10,7 @@ use super::corrections::{FINDINGS, FileFinding, TABLE, left_finding};
 use crate::diagnose::Weight;
 use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind};
-use crate::series::{InputFile, csv_line};
+use crate::series::{csv_line, sha256};
 
 /// A file that was written: a finding with the hash of its bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,10 +22,6 @@ pub struct WrittenProgram {
     /// The program from which it was made, as seen from its folder; absent in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     made_of: Option<String>,
-}
-
-fn sha256(bytes: &[u8]) -> String {
-    InputFile::of_bytes(Path::new(""), bytes).sha256
 }
 
 impl WrittenProgram {

@@ -6,11 +6,30 @@ use std::path::{Path, PathBuf};
 
 use super::strays::free_name;
 use super::tree::{self, write_synced};
+use crate::error::{Code, Error, Result};
 
 /// Endings of files that are looked at, or read by programs, and not edited: records, matrices, reports, pictures.
 const NOT_EDITED: [&str; 5] = ["html", "json", "npy", "png", "svg"];
 /// The folder within a target that no folder can be made beside.
 const WITHIN: &str = "earlier";
+
+/// Keeps a file that is to be replaced under another name, as somebody may have worked with it.
+pub(super) fn keep(file: &Path) -> Result<()> {
+    let kept = free_name(file.to_path_buf()).map_err(|_| {
+        let what = "would be kept under another name, and all of them are taken";
+        Error::new(Code::OutputExists, file.display(), what, "move it and those of its name with .kept- away")
+    })?;
+    fs::read(file).and_then(|bytes| write_synced(&kept, &bytes)).map_err(|e| Error::io(&kept, &e))?;
+    if let Some(folder) = kept.parent() {
+        tree::sync(folder);
+    }
+    tracing::warn!(
+        "{}: no record says whether it was changed since it was written; it is kept as {}",
+        file.display(),
+        kept.display()
+    );
+    Ok(())
+}
 
 /// Keeps those of these files in a target that people edit and that `new` does not have with the same bytes, in one folder beside it: a dozen
 /// copies among the new files would hide them.

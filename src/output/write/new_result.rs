@@ -6,12 +6,13 @@ use std::io;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use super::own::{self, WRITTEN, sha256_of};
+use super::own::{self, WRITTEN};
 use super::place::ResultFolder;
 use super::staging::Staging;
 use super::tree::write_synced;
 use super::{journal, kept, swap, tree};
 use crate::error::{Code, Error, Result};
+use crate::series::sha256;
 
 impl ResultFolder {
     /// Writes a whole result.
@@ -56,8 +57,7 @@ impl NewResult {
             fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
         }
         write_synced(&path, bytes).map_err(|e| Error::io(&path, &e))?;
-        let sha256 = sha256_of(bytes);
-        self.hashes.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), sha256);
+        self.hashes.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), sha256(bytes));
         Ok(())
     }
 

@@ -8,11 +8,12 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::error::{Code, Error, Result};
+use crate::error::Result;
 use crate::output::corrections::{FINDINGS, FileFinding, TABLE};
 use crate::output::frames_record;
+use crate::output::text::json;
 use crate::output::written_programs::{self, WrittenAs};
-use crate::series::InputFile;
+use crate::series::sha256;
 
 /// The record of what was written to a folder: SHA-256 (lower-case hexadecimal) by name.
 pub(super) const WRITTEN: &str = ".robotcal-written.json";
@@ -65,15 +66,10 @@ pub(super) fn standing(folder: &Path, name: &str, files: &[(String, &[u8])]) -> 
             || goes_with_own()
     };
     match recorded {
-        Some(sha256) if sha256_of(&there) == sha256 => Standing::Own,
+        Some(hash) if sha256(&there) == hash => Standing::Own,
         None if is_marked() => Standing::Unrecorded,
         _ => Standing::Others,
     }
-}
-
-/// SHA-256, lower-case hexadecimal.
-pub(super) fn sha256_of(bytes: &[u8]) -> String {
-    InputFile::of_bytes(Path::new(""), bytes).sha256
 }
 
 /// Hashes of what was written to a folder, by name; none where it has no record.
@@ -89,7 +85,7 @@ pub(super) fn record(folder: &Path, new: &BTreeMap<String, String>) -> Result<Ve
     let mut all = written(folder);
     all.retain(|name, _| folder.join(name).is_file());
     all.extend(new.clone());
-    serde_json::to_vec_pretty(&all).map_err(|e| Error::new(Code::RecordNotWritten, WRITTEN, e, "report this"))
+    json(&all, WRITTEN)
 }
 
 fn is_same(name: &str, there: &[u8], files: &[(String, &[u8])]) -> bool {

@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use super::held::{Held, Taken};
 use super::own::{self, Standing, WRITTEN};
 use super::staging::Staging;
-use super::strays::{bring_back, free_name, part_name, sweep_beside};
+use super::strays::{bring_back, part_name, sweep_beside};
 use super::tree::write_synced;
-use super::{journal, tree};
+use super::{journal, kept, tree};
 use crate::error::{Code, Error, Result};
+use crate::series::sha256;
 
 /// What to do where work would be lost.
 const OTHER: &str = "choose another folder for the results";
@@ -190,12 +191,12 @@ impl ResultFolder {
             }
         }
         let staging = Staging::Inside(journal::stage(target).map_err(fail)?);
-        let hashes = files.iter().map(|(name, bytes)| (name.clone(), own::sha256_of(bytes))).collect();
+        let hashes = files.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect();
         let record = own::record(target, &hashes)?;
         for (name, bytes) in files.iter().map(|(n, b)| (n.as_str(), *b)).chain([(WRITTEN, record.as_slice())]) {
             write_synced(&staging.path().join(name), bytes).map_err(|e| Error::io(&target.join(name), &e))?;
         }
-        unrecorded.iter().try_for_each(|file| keep(file))?;
+        unrecorded.iter().try_for_each(|file| kept::keep(file))?;
         journal::commit(target, &hashes.into_keys().chain([WRITTEN.to_owned()]).collect(), &[])?;
         drop(held);
         Ok(())
@@ -256,24 +257,6 @@ impl Drop for ResultFolder {
         // Only folders in which nothing is go.
         self.made.iter().rev().all(|folder| fs::remove_dir(folder).is_ok());
     }
-}
-
-/// Keeps a file that is to be replaced under another name, as somebody may have worked with it.
-fn keep(file: &Path) -> Result<()> {
-    let kept = free_name(file.to_path_buf()).map_err(|_| {
-        let what = "would be kept under another name, and all of them are taken";
-        Error::new(Code::OutputExists, file.display(), what, "move it and those of its name with .kept- away")
-    })?;
-    fs::read(file).and_then(|bytes| write_synced(&kept, &bytes)).map_err(|e| Error::io(&kept, &e))?;
-    if let Some(folder) = kept.parent() {
-        tree::sync(folder);
-    }
-    tracing::warn!(
-        "{}: no record says whether it was changed since it was written; it is kept as {}",
-        file.display(),
-        kept.display()
-    );
-    Ok(())
 }
 
 /// Folders that have to be made, the outermost first.

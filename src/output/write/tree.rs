@@ -47,7 +47,7 @@ impl There {
 /// Looks at the target of a result with these names.
 pub(super) fn there(target: &Path, names: &BTreeSet<String>) -> io::Result<There> {
     let own = own_files(target);
-    let known: BTreeSet<String> = hashes(target).into_iter().map(|(file, _)| file).collect();
+    let known: BTreeSet<String> = hashes(target, &own).into_iter().map(|(file, _)| file).collect();
     let mut there = There::default();
     for entry in entries(target, &folders(own.iter().chain(names)))? {
         let Some(file) = entry.to_str().filter(|e| own.contains(*e)) else {
@@ -100,8 +100,8 @@ pub(super) fn other_record(target: &Path, own: &str) -> Option<&'static str> {
     RECORDS.into_iter().find(|record| *record != own && target.join(record).symlink_metadata().is_ok())
 }
 
-/// SHA-256 of files of an earlier result, by name, as its record and that of the folder hold them.
-fn hashes(target: &Path) -> Vec<(String, String)> {
+/// SHA-256 of an earlier result's `own` files, by name, as its record and that of the folder hold them.
+fn hashes(target: &Path, own: &BTreeSet<String>) -> Vec<(String, String)> {
     #[derive(Deserialize)]
     struct Listed {
         #[serde(default)]
@@ -109,7 +109,6 @@ fn hashes(target: &Path) -> Vec<(String, String)> {
     }
     let read = |record: &str| serde_json::from_slice::<Listed>(&fs::read(target.join(record)).ok()?).ok();
     let listed = SERIES.into_iter().filter_map(read);
-    let own = earlier_files(target).unwrap_or_default();
     let written = own::written(target).into_iter().filter(|(file, _)| own.contains(file));
     listed.flat_map(|l| l.as_written).chain(written).collect()
 }
@@ -120,7 +119,7 @@ pub(super) fn used_since(target: &Path) -> Option<String> {
         let path = target.join(file);
         path.exists() && InputFile::of_file(&path).is_ok_and(|now| now.sha256 != *sha256)
     };
-    let changed = hashes(target).into_iter().find(is_other).map(|(file, _)| file);
+    let changed = hashes(target, &own_files(target)).into_iter().find(is_other).map(|(file, _)| file);
     let is_series = || SERIES.iter().any(|record| target.join(record).exists()) && target.join(IMAGES).exists();
     changed.or_else(|| is_series().then(|| IMAGES.to_owned()))
 }

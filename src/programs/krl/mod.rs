@@ -217,7 +217,7 @@ impl Module<'_> {
                 self.leave_at(reader.index, reader.line(), &word, why);
                 self.goes_untold();
                 self.time_passes();
-            } else if moves && off_zero::moves_beside(&word) {
+            } else if moves && off_zero::BESIDE.contains(&word.as_str()) {
                 self.goes_untold();
                 self.way.may_go(&mut self.now.1);
             } else if moves && is_beside(&reader) {

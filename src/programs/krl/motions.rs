@@ -4,7 +4,7 @@ use super::aggregate::Aggregate;
 use super::assigned::matching;
 use super::frames::Frames;
 use super::moves::NULL_FRAME;
-use super::{AXIS_NAMES, EXTERNAL_NAMES, Module, POSE_NAMES, Value};
+use super::{EXTERNAL_NAMES, Module, POSE_NAMES, Value};
 use crate::error::{Code, Error, Result};
 use crate::programs::program::{MeantPosture, Target, TargetKind, Understood};
 use crate::programs::reason::{LeftReason, Why};
@@ -61,7 +61,7 @@ impl Module<'_> {
         reader.at = at;
         let keeps_orientation = own.keeps_orientation.unwrap_or(self.now.0.keeps_orientation.value);
         let motion = Motion { name, place, frames: own.over(&self.now.0), keeps_orientation };
-        let is_robot_alone = self.setting.axes_apart && self.setting.axes.len() == AXIS_NAMES.len();
+        let is_robot_alone = self.setting.axes_apart && self.setting.external_axes() == 0;
         if reader.rest_of_line_has(IGNORES_EXTERNAL) && !is_robot_alone {
             let words = "external axes do not go where it says, or may not ($EX_AX_IGNORE)";
             self.leave_at(place.0, place.1, name, Why::new(LeftReason::ExternalAxis, words));
@@ -162,7 +162,7 @@ impl Module<'_> {
         let (Ok((end, name)), Ok((auxiliary, _))) = (self.resolved(value), self.resolved(auxiliary)) else {
             return Ok(());
         };
-        let external = self.setting.axes.len().saturating_sub(AXIS_NAMES.len());
+        let external = self.setting.external_axes();
         let Some(missing) = missing_at_end(auxiliary, end, external) else { return Ok(()) };
         let words = format!(
             "it leaves out {missing}, which its auxiliary point has: whether that or the start of the circle counts, is not known"

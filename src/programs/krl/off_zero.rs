@@ -4,15 +4,10 @@ use super::aggregate::external_axis;
 use crate::programs::external::PutAnywhere;
 use crate::programs::scan::{Reader, TokenKind};
 
-/// A motion of external axes beside the program (KUKA, *Operating and programming instructions for system integrators*, asynchronous axes).
-const ASYNCHRONOUS: &str = "ASYPTP";
-/// What moves such axes to where no text tells, ends their motion under way, or lets others move them.
-const ANYWHERE: [&str; 5] = ["ASYCONT", "ASYSTOP", "ASYCANCEL", "$ASYNC_AXIS", "$ASYNC_EX_AX_DECOUPLE"];
-
-/// True for the first word of a statement that moves external axes beside the program, or lets others do so.
-pub(super) fn moves_beside(word: &str) -> bool {
-    word == ASYNCHRONOUS || ANYWHERE.contains(&word)
-}
+/// First words of statements that move external axes beside the program, end their motion under way, or let others move them (KUKA, *Operating and
+/// programming instructions for system integrators*, asynchronous axes).
+pub(super) const BESIDE: [&str; 6] =
+    ["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL", "$ASYNC_AXIS", "$ASYNC_EX_AX_DECOUPLE"];
 
 /// Notes the external axes that a text puts somewhere.
 pub(super) fn look_through(all: &mut PutAnywhere, mut reader: Reader<'_>) {
@@ -23,8 +18,7 @@ pub(super) fn look_through(all: &mut PutAnywhere, mut reader: Reader<'_>) {
             Some(TokenKind::Mark(b'}' | b')' | b']')) => _ = open.pop(),
             _ => {}
         }
-        let name = reader.name().unwrap_or_default();
-        let axis = external_axis(&name);
+        let axis = reader.name().and_then(|name| external_axis(&name));
         let is_element = [b'{', b',', b':'].iter().any(|mark| reader.ahead_is_mark(-1, *mark));
         let is_in_list = is_element && open.last() == Some(&b'{');
         let is_set = reader.ahead_is_mark(-1, b'.') && reader.ahead_is_mark(1, b'=') && !reader.ahead_is_mark(2, b'=');

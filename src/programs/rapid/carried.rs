@@ -52,7 +52,7 @@ impl Task<'_> {
 
     /// Refuses the end of a circle that leaves out an axis of the description which the point on it has: that stands where it stood before that point.
     pub(super) fn tells_axes_of(&self, end: &Node, on_circle: &Node) -> Understood<()> {
-        let known = self.setting.axes.len().saturating_sub(6);
+        let known = self.setting.external_axes();
         let named = |value: &Node| self.places_of(value).unwrap_or_default().into_iter().map(|(axis, _)| axis);
         let missing = named(on_circle).find(|axis| *axis < known && named(end).all(|told| told != *axis));
         let why = missing.map(|axis| {
@@ -96,7 +96,7 @@ impl Task<'_> {
         is_of_joints: bool,
         external: &Understood<[(f64, Range<usize>); 6]>,
     ) -> Understood<()> {
-        let known = self.setting.axes.len().saturating_sub(6);
+        let known = self.setting.external_axes();
         let left = |words| Err(Why::new(LeftReason::ExternalAxis, words));
         if !is_of_joints && self.has_seventh_joint() {
             return left(
@@ -133,7 +133,7 @@ impl Task<'_> {
 
     /// Refuses a pose that does not use an axis which the description lacks and which may stand elsewhere than at zero.
     pub(super) fn keeps_at_zero(&self, external: &[(f64, Range<usize>); 6]) -> Understood<()> {
-        let known = self.setting.axes.len().saturating_sub(6);
+        let known = self.setting.external_axes();
         let leaves_out = |axis| axis >= known && external.get(axis).is_none_or(|(value, _)| *value >= NO_AXIS);
         let why = self.switching.now().off_zero.value().why_kept(leaves_out, external_name);
         why.filter(|_| !self.setting.axes_apart).map_or(Ok(()), Err)

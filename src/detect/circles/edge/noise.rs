@@ -71,10 +71,13 @@ fn quadratic(m: &Normal, a: &[f64; ANNULUS], b: &[f64; ANNULUS]) -> f64 {
 
 /// The odd part of what a fit left on its pixels, over its scale.
 pub fn left(solved: &Solved, pixels: &Pixels) -> OddPart {
+    OddPart::of(residuals(solved, pixels), solved.state.centre)
+}
+
+fn residuals(solved: &Solved, pixels: &Pixels) -> Residuals {
     let level = solved.scale.sqrt().max(f64::MIN_POSITIVE);
     let values = pixels.weighted[..pixels.count].iter().map(|v| f64::from(*v) / level).collect();
-    let residuals = Residuals { at: pixels.places(), values, followed: Vec::new(), beside: None };
-    OddPart::of(residuals, solved.state.centre)
+    Residuals { at: pixels.places(), values, followed: Vec::new(), beside: None }
 }
 
 /// The same with what the fit follows of noise; `None` for a factor without inverse.
@@ -93,5 +96,5 @@ pub fn left_and_followed(solved: &Solved, pixels: &Pixels) -> Option<OddPart> {
         column.iter_mut().for_each(|v| *v /= lower[(i, i)]);
         followed.push(column);
     }
-    Some(OddPart::of(Residuals { followed, beside: Some(beside), ..left(solved, pixels).all }, solved.state.centre))
+    Some(OddPart::of(Residuals { followed, beside: Some(beside), ..residuals(solved, pixels) }, solved.state.centre))
 }
