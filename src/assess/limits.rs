@@ -1,15 +1,32 @@
 //! Every number that decides a verdict on data or result, with its source. `[limits]` of the `--config` file overrides them by
 //! these names, and solution.json holds them as they were used.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::problem::Bounds;
+
+/// A limit, to be set.
+pub(super) enum LimitMut<'a> {
+    Number(&'a mut f64),
+    Count(&'a mut usize),
+}
+
+impl<'a> From<&'a mut f64> for LimitMut<'a> {
+    fn from(number: &'a mut f64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl<'a> From<&'a mut usize> for LimitMut<'a> {
+    fn from(count: &'a mut usize) -> Self {
+        Self::Count(count)
+    }
+}
 
 macro_rules! limits {
     ($($(#[$doc:meta])+ $name:ident: $kind:ty = $value:expr;)+) => {
         /// Numbers that decide verdicts.
-        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-        #[serde(default, deny_unknown_fields)]
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
         pub struct Limits {
             $($(#[$doc])+ pub $name: $kind,)+
         }
@@ -24,6 +41,17 @@ macro_rules! limits {
             /// All of them by name.
             pub fn named(&self) -> Vec<(&'static str, f64)> {
                 vec![$((stringify!($name), self.$name as f64),)+]
+            }
+
+            /// All names.
+            pub(super) const NAMES: &[&str] = &[$(stringify!($name),)+];
+
+            /// The one of this name.
+            pub(super) fn of_name(&mut self, name: &str) -> Option<LimitMut<'_>> {
+                match name {
+                    $(stringify!($name) => Some((&mut self.$name).into()),)+
+                    _ => None,
+                }
             }
         }
     };

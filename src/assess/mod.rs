@@ -10,6 +10,7 @@ mod hold_out_bodies;
 mod identifiability;
 mod in_base;
 mod limits;
+mod limits_read;
 mod mean_square;
 mod near_nominal;
 mod pattern_effect;
