@@ -1,6 +1,5 @@
 //! Whether the descriptions and the programs that `compensate` was given are those that were meant.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::compensate_frames::{SAME_ORIGIN, Side, Sides, solution};
@@ -16,10 +15,6 @@ use crate::urdf::Chain;
 
 /// Beside a corrected description.
 const COMPENSATION: &str = "compensation.toml";
-
-fn finding(code: Code, weight: Weight, subject: &Path, text: String) -> FileFinding {
-    FileFinding { code, weight, subject: subject.display().to_string(), quantities: BTreeMap::new(), text }
-}
 
 /// What is known of the origin of each joint by name is what the chain has.
 fn has_origins(chain: &Chain, origin: impl Fn(&str) -> Option<Pose>) -> bool {
@@ -39,7 +34,7 @@ pub(super) fn equal(made_for: &Robot, sides: &Sides) -> Option<FileFinding> {
         urdf.display()
     );
     let is_same = has_origins(&robot.chain, of_other) && robot.terms == made_for.terms;
-    is_same.then(|| finding(Code::ModelsEqual, Weight::Gate, urdf, text))
+    is_same.then(|| FileFinding::new(Code::ModelsEqual, Weight::Gate, urdf.display(), [], text))
 }
 
 /// A program is what an earlier correction wrote: for the nominal robot it would be corrected twice. One that was taught on a real robot
@@ -56,7 +51,7 @@ pub(super) fn corrected_already(path: &Path, file: &TextFile, is_taught: bool) -
         ),
     };
     let text = format!("{} {is} (give the program from which it was made)", path.display());
-    Some(finding(Code::CorrectedAlready, weight, path, text))
+    Some(FileFinding::new(Code::CorrectedAlready, weight, path.display(), [], text))
 }
 
 /// `--nominal` is what a solution made of `--urdf`.
@@ -72,7 +67,7 @@ pub(super) fn exchanged(controller: &Robot, nominal: &Path, sides: &Sides) -> Re
         nominal.display(),
         urdf.display()
     );
-    Ok(is_exchanged.then(|| finding(Code::ModelsExchanged, Weight::Gate, nominal, text)))
+    Ok(is_exchanged.then(|| FileFinding::new(Code::ModelsExchanged, Weight::Gate, nominal.display(), [], text)))
 }
 
 /// A compensation.toml of this very description stands beside it, and was not given.
@@ -87,5 +82,5 @@ pub(super) fn not_given(side: &Side, given: Option<&Path>, flag: &str) -> Option
     );
     whole
         .filter(|robot| !robot.terms.is_empty())
-        .map(|_| finding(Code::CompensationNotGiven, Weight::Note, side.urdf, text))
+        .map(|_| FileFinding::new(Code::CompensationNotGiven, Weight::Note, side.urdf.display(), [], text))
 }

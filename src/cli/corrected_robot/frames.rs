@@ -1,6 +1,5 @@
 //! `robotcal frames`: tool and work object of a robot that was identified, from touches.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -17,7 +16,7 @@ use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, Seen, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
 use crate::identify::{leave_out_repeated_bodies, measure_bodies, mirror_image, touch_mistake};
-use crate::output::corrections::{FileFinding, numbers};
+use crate::output::corrections::FileFinding;
 use crate::output::frame_files::{self, Frames, Named};
 use crate::output::frame_findings::{frame_findings, mirror_image_fits};
 use crate::output::frames_record::{
@@ -111,38 +110,18 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     findings.extend(mirrored.map(|joints| mirror_image_fits(&joints, &subject)));
     findings.extend(from_below(robot.exported(), (&fitted, &touches), &found.limits, &subject));
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
+    let robot_record = RobotOfFrames {
+        solution: InputFile::of_file(&args.from)?,
+        name: record.robot.name.clone(),
+        base: record.robot.base.clone(),
+        tip: record.robot.tip.clone(),
+        checks: checks(&robot),
+    };
     let made = FramesRecord {
-        format: FORMAT,
-        version: env!("CARGO_PKG_VERSION").into(),
-        command: std::env::args().collect::<Vec<_>>().join(" "),
-        robot: RobotOfFrames {
-            solution: InputFile::of_file(&args.from)?,
-            name: record.robot.name.clone(),
-            base: record.robot.base.clone(),
-            tip: record.robot.tip.clone(),
-            checks: checks(&robot),
-        },
         inputs: files.into_iter().chain(plans).collect(),
         tool: tool_told.then(|| tool_record(args, &record, &fitted, &touches)),
-        work: fitted.work.as_ref().map(|pose| WorkRecord {
-            name: work_name(&touches),
-            parent: record.robot.base.clone(),
-            measured: if placement.is_some() { WorkKind::Plate } else { WorkKind::Measured },
-            pose: pose.into(),
-            covariance: fitted.work_covariance.as_ref().map_or_else(Vec::new, flat),
-        }),
-        sigma_factor: fitted.factor,
-        rms_m: fitted.rms_m,
-        expected: fitted.expected,
-        touches: touch_records(&fitted, &touches),
         findings: findings.clone(),
-        knowledge: KnowledgeRecord {
-            placement,
-            frames: rows(&fitted.knowledge.frames),
-            cross: rows(&fitted.knowledge.cross),
-            learned: fitted.knowledge.learned.as_slice().to_vec(),
-            taken: fitted.knowledge.taken.as_slice().to_vec(),
-        },
+        ..record_of((&fitted, &touches), robot_record, placement)
     };
     let mut files = frame_files::files(&frames);
     let urdf = corrected_urdf(&record, &found, &in_the_base(&frames, &record, &fitted))?;
@@ -204,9 +183,9 @@ fn other_zeros(
     let text = format!(
         "the touches contradict the solution {factor:.1} times as far as they may with their readings as taken, and {other_factor:.1} times as those of the controller {word} the offsets of mastering.csv were entered: say --readings {word}"
     );
-    let quantities = numbers([("factor", factor), ("other_factor", other_factor)]);
+    let quantities = [("factor", factor), ("other_factor", other_factor)];
     let is_other = factor > limits.touch_factor && other_factor <= limits.touch_factor;
-    is_other.then(|| gate(Code::ReadingsOfOtherZeros, subject, quantities, text))
+    is_other.then(|| FileFinding::new(Code::ReadingsOfOtherZeros, Weight::Gate, subject, quantities, text))
 }
 
 /// The tool is hardly known relative to the plate.
@@ -216,7 +195,7 @@ fn plate_weak(fit: &FrameFit, touches: &Touches, limits: &Limits, subject: &str)
         "the tool relative to the plate is hardly told: {sigma_mm:.1} mm RMS expected over the stops of the solution and the touches; touch with the tip turned further, and markers further apart"
     );
     let is_weak = !touches.all.is_empty() && sigma_mm > limits.frame_sigma_mm;
-    is_weak.then(|| gate(Code::FrameWeak, subject, numbers([("sigma_mm", sigma_mm)]), text))
+    is_weak.then(|| FileFinding::new(Code::FrameWeak, Weight::Gate, subject, [("sigma_mm", sigma_mm)], text))
 }
 
 /// Stops that are named.
@@ -245,17 +224,14 @@ fn computed(
             if as_planned.len() > MOST_STOPS { ", .." } else { "" }
         )
     };
-    let quantities = numbers([
+    let quantities = [
         ("size", size),
         ("freedom", freedom as f64),
         ("rms_mm", 1e3 * fit.rms_m),
         ("as_planned", as_planned.len() as f64),
-    ]);
-    (is_exact || !as_planned.is_empty()).then(|| gate(Code::TouchesExact, subject, quantities, what))
-}
-
-fn gate(code: Code, subject: &str, quantities: BTreeMap<String, f64>, text: String) -> FileFinding {
-    FileFinding { code, weight: Weight::Gate, subject: subject.to_owned(), quantities, text }
+    ];
+    (is_exact || !as_planned.is_empty())
+        .then(|| FileFinding::new(Code::TouchesExact, Weight::Gate, subject, quantities, what))
 }
 
 /// The failure of the fit with the folders of the touches that it is about.
@@ -382,6 +358,37 @@ fn work_name(touches: &Touches) -> String {
     let name = touches.frame.as_deref().unwrap_or(UNNAMED);
     // What places are called whose frame `[contact]` does not name.
     if name == "contact" { UNNAMED.to_owned() } else { name.to_owned() }
+}
+
+/// What was fitted, without inputs, tool and findings.
+fn record_of((fit, touches): (&FrameFit, &Touches), robot: RobotOfFrames, placement: Option<usize>) -> FramesRecord {
+    FramesRecord {
+        format: FORMAT,
+        version: env!("CARGO_PKG_VERSION").into(),
+        command: std::env::args().collect::<Vec<_>>().join(" "),
+        inputs: Vec::new(),
+        tool: None,
+        work: fit.work.as_ref().map(|pose| WorkRecord {
+            name: work_name(touches),
+            parent: robot.base.clone(),
+            measured: if placement.is_some() { WorkKind::Plate } else { WorkKind::Measured },
+            pose: pose.into(),
+            covariance: fit.work_covariance.as_ref().map_or_else(Vec::new, flat),
+        }),
+        robot,
+        sigma_factor: fit.factor,
+        rms_m: fit.rms_m,
+        expected: fit.expected,
+        touches: touch_records(fit, touches),
+        findings: Vec::new(),
+        knowledge: KnowledgeRecord {
+            placement,
+            frames: rows(&fit.knowledge.frames),
+            cross: rows(&fit.knowledge.cross),
+            learned: fit.knowledge.learned.as_slice().to_vec(),
+            taken: fit.knowledge.taken.as_slice().to_vec(),
+        },
+    }
 }
 
 fn tool_record(args: &FramesArgs, record: &SolutionRecord, fit: &FrameFit, touches: &Touches) -> ToolRecord {

@@ -8,7 +8,7 @@ use crate::cli::Verdict;
 use crate::cli::terminal::say::{self, say_line};
 use crate::diagnose::{Finding, Weight};
 use crate::error::Code;
-use crate::output::corrections::{FileFinding, numbers};
+use crate::output::corrections::FileFinding;
 use crate::urdf::JointKind;
 
 /// Everything that counts.
@@ -60,7 +60,7 @@ impl Reasons {
                     "{} misses by {mm:.3} mm RMS, as robots do that nobody corrected ({usual_mm} mm and more): another robot, a zero or link that changed, or no corrected description; give --nominal to compare with",
                     urdf.display()
                 );
-                self.findings.push(finding(Code::NotCorrected, Weight::Gate, urdf, [("rms_mm", mm)], text));
+                self.findings.push(FileFinding::new(Code::NotCorrected, Weight::Gate, urdf.display(), [("rms_mm", mm)], text));
             }
             None => self.good.push(format!(
                 "{mm:.3} mm, less than the {usual_mm} mm of robots that nobody corrected (--nominal tells what was gained)"
@@ -75,7 +75,7 @@ impl Reasons {
             urdf.display(),
             stated.path.display()
         );
-        self.findings.push(finding(Code::OwnMeasurement, Weight::Note, urdf, [], text));
+        self.findings.push(FileFinding::new(Code::OwnMeasurement, Weight::Note, urdf.display(), [], text));
     }
 
     /// True where the model misses by more than it should.
@@ -109,16 +109,6 @@ impl Reasons {
     }
 }
 
-fn finding<const N: usize>(
-    code: Code,
-    weight: Weight,
-    subject: &Path,
-    quantities: [(&str, f64); N],
-    text: String,
-) -> FileFinding {
-    FileFinding { code, weight, subject: subject.display().to_string(), quantities: numbers(quantities), text }
-}
-
 /// More than a right model misses by, as far beyond that as a good robot repeats.
 fn exceeded(
     (urdf, rms_m): (&Path, f64),
@@ -135,7 +125,7 @@ fn exceeded(
     );
     let weight = if times > limits.beyond_stated { Weight::Gate } else { Weight::Note };
     let quantities = [("rms_mm", mm), ("stated_mm", rms), ("stated_most_mm", most)];
-    (times > 1.0).then(|| finding(Code::StatedExceeded, weight, urdf, quantities, text))
+    (times > 1.0).then(|| FileFinding::new(Code::StatedExceeded, weight, urdf.display(), quantities, text))
 }
 
 /// A finding about the series of the measurement, where it tells why a model misses.

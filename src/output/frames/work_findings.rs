@@ -1,7 +1,5 @@
 //! What a measured work object says of the frame that its places are given in.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Vector3;
 
 use crate::assess::Limits;
@@ -10,7 +8,7 @@ use crate::error::Code;
 use crate::frames::{FrameFit, Touches};
 use crate::geom::Pose;
 use crate::model::robot::{Posture, Robot};
-use crate::output::corrections::{FileFinding, numbers};
+use crate::output::corrections::FileFinding;
 
 /// The places are said to stand in the base of the robot, and their frame does not.
 pub fn other_frame(base: &str, (fit, name): (&FrameFit, &str), limits: &Limits, subject: &str) -> Option<FileFinding> {
@@ -23,14 +21,8 @@ pub fn other_frame(base: &str, (fit, name): (&FrameFit, &str), limits: &Limits, 
         rad.to_degrees()
     );
     let is_other = m > limits.same_tool_m || rad > limits.same_work_rad;
-    let quantities = numbers([("distance_mm", 1e3 * m), ("angle_deg", rad.to_degrees())]);
-    is_other.then(|| FileFinding {
-        code: Code::FramesDiffer,
-        weight: Weight::Gate,
-        subject: subject.to_owned(),
-        quantities,
-        text,
-    })
+    let quantities = [("distance_mm", 1e3 * m), ("angle_deg", rad.to_degrees())];
+    is_other.then(|| FileFinding::new(Code::FramesDiffer, Weight::Gate, subject, quantities, text))
 }
 
 /// Places of one plane that were all touched from its negative side: by mirrored coordinates the plane looks the other way, and nothing else
@@ -53,11 +45,5 @@ pub fn from_below(
     let text =
         "the tool came from below the plane of the places (from negative z) at every touch: if that is not so, a coordinate of the places is mirrored"
             .to_owned();
-    (is_flat && is_below).then(|| FileFinding {
-        code: Code::TouchedFromBelow,
-        weight: Weight::Note,
-        subject: subject.to_owned(),
-        quantities: BTreeMap::new(),
-        text,
-    })
+    (is_flat && is_below).then(|| FileFinding::new(Code::TouchedFromBelow, Weight::Note, subject, [], text))
 }

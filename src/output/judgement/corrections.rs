@@ -1,7 +1,7 @@
 //! What a corrected program is worth, beside its text: corrections.csv and findings.json.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +39,19 @@ pub struct FileFinding {
     pub quantities: BTreeMap<String, f64>,
     /// In words.
     pub text: String,
+}
+
+impl FileFinding {
+    /// About a file, with numbers by name.
+    pub fn new<const N: usize>(
+        code: Code,
+        weight: Weight,
+        subject: impl Display,
+        quantities: [(&str, f64); N],
+        text: String,
+    ) -> Self {
+        Self { code, weight, subject: subject.to_string(), quantities: numbers(quantities), text }
+    }
 }
 
 /// Numbers by name.
@@ -122,8 +135,7 @@ pub fn left_finding<'a>(reasons: impl Iterator<Item = &'a str>, subject: &str) -
 pub fn missing_finding(program: &Program, left: &[Left], subject: &str) -> Option<FileFinding> {
     let is_empty = program.targets.is_empty() && left.is_empty();
     let text = "no target is found in the programs: look at --language, and whether the files are whole".to_owned();
-    let (code, weight, subject) = (Code::TargetsMissing, Weight::Gate, subject.to_owned());
-    is_empty.then(|| FileFinding { code, weight, subject, quantities: BTreeMap::new(), text })
+    is_empty.then(|| FileFinding::new(Code::TargetsMissing, Weight::Gate, subject, [], text))
 }
 
 /// Expected error of every corrected target with base and tool unknown, m.
