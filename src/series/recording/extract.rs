@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use super::collect::{Collector, Group, Rows, StopReport, unlike};
-use super::delay::{self, Delay, Frames, Guess};
+use super::delay::Delay;
 use super::file::for_each;
+use super::lateness::{Lateness, OTHER_CLOCK, delayed, nanoseconds};
 use super::messages::CameraInfo;
 use super::motion::{Posture, Standstill, postures, standstills};
 use super::moving::Moving;
@@ -23,9 +24,6 @@ const MARGIN_NS: i64 = 50_000_000;
 /// A robot that seems to stand for less than this need not have stopped, ns: what is seen of a standstill is shorter than it by the time
 /// over which speed is taken.
 const LEAST_SEEN_NS: i64 = 20_000_000;
-/// Delays of images and joints that differ by more deserve a look, s.
-const NOTABLE_DELAY_S: f64 = 0.05;
-
 /// The stops of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extracted {
@@ -76,31 +74,16 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let joints_place = format!("{}, topic {}", recording.display(), topics.join(", "));
     two_publishers::require_one(&joints_place, &samples, &joints, &still_speeds, or_urdf(options))?;
     require_overlap(&scan, &postures, &times)?;
-    let image_delay_s = scan.delay_s(std::slice::from_ref(&image_topic)) - scan.delay_s(&topics);
-    let guess = match options.clock {
-        Clock::Stamp => Guess::of_arrival(-image_delay_s),
-        Clock::Log => Guess::of_arrival(image_delay_s),
-    };
-    let told = match options.image_delay_s {
-        Some(delay_s) => Told::By(delay_s),
-        None => told_by_motion(&scan, &image_topic, (&postures, &times), guess, options)?,
-    };
-    // In the time of the images, the joints were there so much later.
-    let later_ns = match told {
-        Told::By(delay_s) | Told::Found(Delay { delay_s, .. }) => nanoseconds(delay_s),
-        Told::NoDelay | Told::Open => 0,
-    };
+    let lateness = Lateness::of(&scan, (&image_topic, &topics), (&postures, &times), options)?;
+    let (later_ns, open) = (lateness.later_ns(), lateness.open_ns());
     postures.iter_mut().for_each(|p| p.time_ns += later_ns);
     let begin_ns = samples.iter().map(|s| s.time_ns).min().unwrap_or_default();
-    let is_open = told == Told::Open && options.clock == Clock::Stamp && image_delay_s.abs() > NOTABLE_DELAY_S;
-    let open = if is_open { nanoseconds(-image_delay_s) } else { 0 };
     let later = (later_ns + open.min(0), later_ns + open.max(0));
     scan.notices.extend(silence::notices(recording, &samples, &joints, (&times, later)));
     scan.notices.extend(Gaps::of(&samples, &joints, &still_speeds).leave_out(recording, begin_ns, later, &mut times));
-    let late = told.late();
+    let late = lateness.told.late();
     scan.notices.extend(late.map(|d| d.notice(recording)));
-    let growth_s = scan.delay_growth_s(&image_topic) - scan.delay_growth_s(&topics[0]);
-    let groups = groups(&mut scan, &postures, &times, options, (open, told.sigma_s())).map_err(|error| {
+    let groups = groups(&mut scan, &postures, &times, options, (open, lateness.told.sigma_s())).map_err(|error| {
         let error = or_set_back(error, &scan.notices);
         let never_still = error.code == Code::RobotNeverStill;
         let others = if never_still { others_move(&error.place, &postures, &joints, options) } else { None };
@@ -118,16 +101,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let (rows, unread) = collected(&scan, &image_topic, collector)?;
     let mut notices = std::mem::take(&mut scan.notices);
     notices.extend(unread);
-    if growth_s.abs() > NOTABLE_DELAY_S {
-        notices.push(run_apart(recording, growth_s));
-    } else if is_open {
-        let what = format!(
-            "{}, and motion in the images does not tell which is right: images are taken where the robot stands still by either",
-            delayed(image_delay_s)
-        );
-        notices.push(Notice::new(Code::ImagesDelayed, recording.display(), what, OTHER_CLOCK));
-    }
-    notices.extend((told == Told::Open && !is_open).then(|| delay::unchecked(recording)));
+    notices.extend(lateness.notices(recording));
     let (stops, reports): (Vec<_>, Vec<_>) = rows.into_values().unzip();
     notices.extend(unlike(recording, &reports));
     Ok(Extracted {
@@ -135,7 +109,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         joint_unit,
         is_unit_in_doubt,
         reports,
-        image_delay_s,
+        image_delay_s: lateness.image_delay_s,
         late,
         camera_info: scan.camera_info(&image_topic).cloned(),
         joint_topic: topics.join(", "),
@@ -168,89 +142,6 @@ fn collected(scan: &Scan, topic: &str, mut collector: Collector<'_>) -> Result<(
         Notice::new(Code::MessagesUnreadable, place, what, "they are left out")
     });
     Ok((taken.rows, unread))
-}
-
-/// Clocks of images and joints that run apart by so much from begin to end, s.
-fn run_apart(recording: &Path, growth_s: f64) -> Notice {
-    let what = format!(
-        "images take {} from stamp to arrival at the end than at the beginning, joint states do not: the clocks of camera and robot run apart",
-        difference(growth_s)
-    );
-    let remedy = "use the times of recording (--clock log), or let one clock stamp both";
-    Notice::new(Code::ClocksApart, recording.display(), what, remedy)
-}
-
-/// What to do where stamps and arrival contradict each other.
-const OTHER_CLOCK: &str =
-    "state the delay (--image-delay 0 where the stamps are right), or take the times of recording (--clock log)";
-
-fn delayed(image_delay_s: f64) -> String {
-    format!("images take {} from stamp to arrival than joint states", difference(image_delay_s))
-}
-
-fn difference(s: f64) -> String {
-    format!("{:.3} s {}", s.abs(), if s < 0.0 { "less" } else { "more" })
-}
-
-fn nanoseconds(s: f64) -> i64 {
-    (s * 1e9).round() as i64
-}
-
-/// What is known of the delay of the images.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Told {
-    /// It is given, s.
-    By(f64),
-    /// What the images show tells it.
-    Found(Delay),
-    /// What the images show tells that there is none that matters to a robot that stands.
-    NoDelay,
-    /// The images do not tell it.
-    Open,
-}
-
-impl Told {
-    fn late(self) -> Option<Delay> {
-        match self {
-            Self::Found(delay) => Some(delay),
-            _ => None,
-        }
-    }
-
-    /// Standard deviation of the delay that is taken off, s; none where nothing is known of it.
-    fn sigma_s(self) -> Option<f64> {
-        match self {
-            Self::By(_) => Some(0.0),
-            Self::Found(delay) => Some(delay.sigma_s),
-            Self::NoDelay | Self::Open => None,
-        }
-    }
-}
-
-/// The delay of the images by what they show.
-fn told_by_motion(
-    scan: &Scan,
-    topic: &str,
-    (postures, times): (&[Posture], &[i64]),
-    guess: Guess,
-    options: &RecordingOptions,
-) -> Result<Told> {
-    let still = standstills(postures, options.still_speed, nanoseconds(options.least_still_s));
-    let Some(mut frames) = Frames::about_motions(times, &still, guess) else { return Ok(Told::Open) };
-    for file in &scan.files {
-        for_each(file, |message| {
-            if message.topic == topic {
-                frames.take(&message, options.clock);
-            }
-            Ok(())
-        })?;
-    }
-    let pairs = frames.pairs();
-    Ok(match delay::measured(&pairs, postures, guess) {
-        Some(delay) if options.motion != Motion::Refuse || delay.is_notable(&pairs) => Told::Found(delay),
-        Some(_) => Told::NoDelay,
-        None => Told::Open,
-    })
 }
 
 /// Times that do not fit to each other after a clock was set back: stamps are right by no delay.
@@ -574,10 +465,5 @@ mod tests {
         let [told, untold] = [vec![set], Vec::new()].map(refused);
         assert_eq!([told.code, untold.code], [Code::ClocksApart; 2]);
         assert!(told.what.ends_with("; back") && told.remedy != untold.remedy, "{told:?}");
-    }
-
-    #[test]
-    fn a_delay_has_no_sign_in_words() {
-        assert_eq!([difference(-0.18), difference(0.18)], ["0.180 s less", "0.180 s more"]);
     }
 }

@@ -16,6 +16,7 @@ mod frame;
 #[cfg(feature = "mcap")]
 mod interfaces;
 mod kind;
+mod lateness;
 mod message;
 mod messages;
 mod motion;
