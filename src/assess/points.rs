@@ -2,10 +2,12 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3x6, SMatrix, Vector3};
 
+use super::mean_square::MeanSquare;
 use crate::geom::{Pose, rigid_fit, skew};
 use crate::linalg::{SymmetricFactor, product};
 use crate::model::joint_terms::LOCAL_RANGE;
 use crate::model::robot::{Posture, Robot};
+use crate::solve::Spread;
 
 /// One point as a tracker saw it.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,6 +107,8 @@ pub(super) fn by_frame_and_reflector(
 pub struct ExpectedRms {
     /// From the uncertainty of the model alone, m.
     pub model_m: f64,
+    /// Upper end of its 95 % interval, m: few directions of the model count at few points.
+    pub most_model_m: f64,
     /// With the joint noise of every stop, m.
     pub with_joint_noise_m: f64,
     /// Mean squares of what the noise of every reading adds, m^2.
@@ -150,6 +154,9 @@ impl PointFit {
         let (model, noise) = (left(&d.by_model), left(&d.by_noise));
         let n = points.len() as f64;
         let of_model = product(&model, covariance).component_mul(&model).sum() / n;
+        let mut squares = MeanSquare::new(model.ncols());
+        (0..points.len()).for_each(|k| squares.add(&model.fixed_rows::<3>(3 * k).into_owned(), &Vector3::zeros()));
+        let [_, most_model_m] = squares.interval_m(covariance, Spread { variance: 0.0, sigma: 0.0 });
         let readings = joint_sigma.len();
         let of_reading =
             |r: usize| (0..points.len()).map(|k| noise.column(k * readings + r).norm_squared()).sum::<f64>();
@@ -157,6 +164,7 @@ impl PointFit {
         let of_noise: f64 = by_reading.iter().sum();
         Some(ExpectedRms {
             model_m: of_model.max(0.0).sqrt(),
+            most_model_m,
             with_joint_noise_m: (of_model + of_noise).max(0.0).sqrt(),
             by_reading,
         })

@@ -110,6 +110,9 @@ impl Kind for FocusChange {
     }
 
     fn remedy(&self) -> String {
-        "fix focus and zoom".into()
+        format!(
+            "fix focus and zoom, and take the series again, or put the images from {} on into a series of their own with another [camera] name and the same mounting",
+            self.image
+        )
     }
 }

@@ -2,7 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::stop_index::{StopIndex, position, position_columns, refuse_twice, sigma, stop_column, target_name};
+use super::stop_index::{
+    StopIndex, position, position_columns, refuse_twice, sigma_of_place, stop_column, target_name,
+};
 use super::table::Table;
 use crate::error::Result;
 
@@ -32,7 +34,7 @@ pub(super) fn rows(table: &Table, stops: &StopIndex<'_>) -> Result<Vec<PointRow>
             stop: stops.find(table, row, stop)?,
             target: target_name(table, row, target)?,
             tracker_from_point_m: position(table, row, xyz)?,
-            sigma_m: sigma(table, row, sigma_m)?,
+            sigma_m: sigma_of_place(table, row, sigma_m)?,
             line: row.line,
         })
     };

@@ -1,7 +1,9 @@
 //! `poses.csv`: poses of a body on the tip, seen by a tracker.
 
 use super::quaternion::{are_zeros, quaternion};
-use super::stop_index::{StopIndex, position, position_columns, refuse_twice, sigma, stop_column, target_name};
+use super::stop_index::{
+    StopIndex, position, position_columns, refuse_twice, sigma, sigma_of_place, stop_column, target_name,
+};
 use super::table::Table;
 use crate::error::Result;
 use crate::geom::Pose;
@@ -54,7 +56,7 @@ pub(super) fn rows(table: &Table, stops: &StopIndex<'_>) -> Result<(Vec<PoseRow>
             stop: stop_index,
             target: name,
             tracker_from_target: Pose::new(quaternion(table, row, xyzw, row.cell(stop))?, place),
-            sigma_m: sigma(table, row, sigma_m)?,
+            sigma_m: sigma_of_place(table, row, sigma_m)?,
             sigma_rad: sigma(table, row, sigma_rad)?,
             line: row.line,
         });

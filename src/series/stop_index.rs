@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::joints::{StopKey, Stops};
 use super::table::{Row, Table};
+use super::toml_file::{LARGEST_SIGMA_M, SIGMA_IN_METRES};
 use crate::error::{Code, Error, Result, closest_name};
 
 /// The stops of a series by name.
@@ -78,6 +79,17 @@ pub(super) fn sigma(table: &Table, row: Row<'_>, column: Option<usize>) -> Resul
     match (column, value) {
         (Some(c), Some(v)) if v <= 0.0 => {
             Err(table.refuse(Code::CsvRange, row, c, "is not positive", "give the standard deviation, or nothing"))
+        }
+        _ => Ok(value),
+    }
+}
+
+/// The same of a coordinate, m.
+pub(super) fn sigma_of_place(table: &Table, row: Row<'_>, column: Option<usize>) -> Result<Option<f64>> {
+    let value = sigma(table, row, column)?;
+    match (column, value) {
+        (Some(c), Some(v)) if v >= LARGEST_SIGMA_M => {
+            Err(table.refuse(Code::CsvRange, row, c, "is larger than of any measurement", SIGMA_IN_METRES))
         }
         _ => Ok(value),
     }

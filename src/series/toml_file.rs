@@ -19,6 +19,22 @@ pub(super) fn require_positive(path: &Path, key: &str, value: Option<f64>) -> Re
     }
 }
 
+/// A coordinate is measured to less, m: a larger number is one in mm.
+pub(super) const LARGEST_SIGMA_M: f64 = 0.01;
+/// What to do about such a number.
+pub(super) const SIGMA_IN_METRES: &str = "write it in metres: 0.00005 for 0.05 mm";
+
+/// Refuses the standard deviation of a coordinate that is not positive, or not in metres.
+pub(super) fn require_sigma_m(path: &Path, key: &str, value: Option<f64>) -> Result<()> {
+    require_positive(path, key, value)?;
+    match value {
+        Some(v) if v >= LARGEST_SIGMA_M => {
+            Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), SIGMA_IN_METRES))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Refuses other versions of a format.
 pub(super) fn check_format(path: &Path, format: u32) -> Result<()> {
     if format == 1 {

@@ -192,7 +192,9 @@ fn refuse_other_lengths(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f
     let keeps = |i: usize, q: &[f64], factor: f64, slack: f64| fits(chain, std::iter::once(i), q, factor, slack);
     let units_of = |i: usize| -> Vec<&LengthUnit> {
         let fit = |unit: &&LengthUnit| of_most(&|q| !keeps(i, q, 1.0, 1.0) && keeps(i, q, unit.metres, SOFT_LIMITS_M));
-        LENGTH_UNITS.iter().filter(fit).collect()
+        // Counted the other way it keeps its limits as well: the measurements tell.
+        let is_negated = of_most(&|q| keeps(i, q, -1.0, SOFT_LIMITS_M));
+        if is_negated { Vec::new() } else { LENGTH_UNITS.iter().filter(fit).collect() }
     };
     let Some((reading, units)) = sliding().map(|i| (i, units_of(i))).find(|(_, units)| !units.is_empty()) else {
         return Ok(());
@@ -204,9 +206,15 @@ fn refuse_other_lengths(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f
         chain.readings[reading],
         joined(|unit| unit.name.to_owned())
     );
+    let is_within = limits(chain, reading).is_some_and(|(least, most)| high - low <= most - least + SOFT_LIMITS_M);
     let remedy = format!(
-        "prismatic joints are metres: multiply the column by {}",
-        joined(|unit| format!("{} ({})", unit.metres, unit.sign))
+        "prismatic joints are metres: multiply the column by {}{}",
+        joined(|unit| format!("{} ({})", unit.metres, unit.sign)),
+        if is_within {
+            "; if it is in metres, its zero is not that of the URDF: add what lies between them"
+        } else {
+            ""
+        }
     );
     let is_angle_of = |other: usize, value: f64| {
         let (low, high) = limits(chain, other).unwrap_or((-FOREIGN_LIMITS_RAD, FOREIGN_LIMITS_RAD));

@@ -383,7 +383,12 @@ fn bad_touches_are_refused_by_file_and_place() {
         std::fs::write(path, plain.replacen("tip =", "base = \"link_1\"\ntip =", 1)).unwrap();
     };
     refused(call(&other_base), 2, Code::SolutionDiffers, &["series.toml", "link_1", "base_link"]);
-    refused(call(&edit("series.toml", "sigma_m = 0.00005", "sigma_m = 0.05")), 2, Code::TouchUnit, &["t00"]);
+    refused(
+        call(&edit("series.toml", "sigma_m = 0.00005", "sigma_m = 0.05")),
+        2,
+        Code::SettingRange,
+        &["contact.sigma_m"],
+    );
     refused(
         call(&edit("contacts.csv", "x_m,y_m,z_m", "x_mm,y_mm,z_mm")),
         2,

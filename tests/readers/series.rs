@@ -324,6 +324,9 @@ fn an_impossible_unit_is_refused_and_a_possible_one_is_not() {
         Code::MillimetresAsMetres,
         &["x reads 500", "0.001 (mm)"],
     );
+    // Counted the other way it is metres as well.
+    let negated: Vec<[f64; 3]> = radians.iter().map(|[x, a, b]| [-4.0 * x, *a, *b]).collect();
+    assert_eq!(with_readings(Rad, &negated), Ok(()));
     // A slide that reads what a turning joint may, beside one that reads what the slide may.
     let exchanged: Vec<[f64; 3]> = degrees.iter().map(|[x, a, b]| [*b, *a, *x]).collect();
     assert_says(&with_readings(Deg, &exchanged).unwrap_err(), Code::JointOrderWrong, &["x", "j2"]);

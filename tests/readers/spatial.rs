@@ -92,6 +92,11 @@ fn bad_sections_name_their_key() {
     let with = |lines: &str| refusal("series.toml", &format!("{MANIFEST}{lines}\n"));
     assert_says(&with("[tracker]\nsigma_m = 0"), Code::SettingRange, &["tracker.sigma_m"]);
     assert_says(&with("[contact]\nsigma = 1"), Code::SettingSyntax, &["series.toml:4", "`sigma`"]);
+    for section in ["tracker", "contact"] {
+        let in_mm = with(&format!("[{section}]\nsigma_m = 0.03"));
+        assert_says(&in_mm, Code::SettingRange, &[&format!("{section}.sigma_m"), "0.03", "metres"]);
+    }
+    assert_says(&refusal("points.csv", &POINTS.replace("0.0001", "0.1")), Code::CsvRange, &["points.csv:3", "0.1"]);
     assert_says(
         &with("[controller]\nrotation = \"abc\""),
         Code::SettingSyntax,

@@ -358,6 +358,19 @@ fn mistakes_in_readings_are_named_by_sockets_alone() {
     };
     assert_eq!(named(&|q| q[4] = -q[4]), Code::JointSignWrong);
     assert_eq!(named(&|q| q.swap(3, 5)), Code::JointOrderWrong);
+    assert_eq!(named(&|q| q.iter_mut().for_each(|q| *q = q.to_degrees())), Code::JointUnitWrong);
+}
+
+/// An arm that hardly moves keeps any ball in its socket.
+#[test]
+fn readings_of_other_stops_are_no_wrong_unit_in_sockets() {
+    let world = World::sockets(15, 4, 12, 5e-5, 2e-5);
+    let mut series = world.series.clone();
+    let readings: Vec<_> = series.stops.iter().map(|s| s.readings.clone()).collect();
+    let count = readings.len();
+    series.stops.iter_mut().enumerate().for_each(|(k, stop)| stop.readings = readings[(5 * k + 7) % count].clone());
+    let refused = identify(world.chain.clone(), &[series], &Options::default()).map(|_| ()).unwrap_err();
+    assert_eq!(refused.code, Code::ReadingsContradict, "{refused}");
 }
 
 /// What is said of the size of measured lengths: by how much they are too long.

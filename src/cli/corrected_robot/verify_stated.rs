@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::Vector6;
+use nalgebra::{DMatrix, Vector6};
 
 use super::compensate_frames::{Side, solution};
 use crate::assess::{
     Limits, MeasuredPoint, NORMAL_95, PredictedFlange, by_readings, fit_points, most_of_sum, root_mean_square,
 };
 use crate::cli::results::show::read_solution;
+use crate::model::joint_terms::Term;
 use crate::model::robot::{Posture, Robot};
 use crate::output::ALONE;
 use crate::output::restore::{FoundModel, exported_model, measured_series};
@@ -84,8 +85,11 @@ impl Stated {
         let [model_m, lacking_m] = [rms(of_model), rms(lacking)];
         // The stated scatter stands for that at the stops.
         let [at_stops_m, most_m] = self.scatter_m(&by_readings(&self.found.robot, &stops), stops.len());
-        let scatter_m = self.record.flange?.scatter_m;
-        let expected = self.expectation((model_m, lacking_m), [scatter_m, scatter_m + (most_m - at_stops_m)])?;
+        let stated = self.record.flange?;
+        let scatter_m = stated.scatter_m;
+        let widening = stated.intervals.map_or(NORMAL_95, |i| i.model_m[1] / stated.model_m);
+        let expected = self
+            .expectation(([model_m, widening * model_m], lacking_m), [scatter_m, scatter_m + (most_m - at_stops_m)])?;
         // What was found for images that the fit had not seen is of this kind.
         let held_out_m = 1e-3 * self.record.accuracy.calibrated.rms_mm;
         let most_m = if held_out_m.is_finite() { expected.most_m.max(held_out_m) } else { expected.most_m };
@@ -98,7 +102,8 @@ impl Stated {
         let robot = &self.found.robot;
         let unit = vec![1.0; self.found.joint_sigma.len()];
         let left = fit_points(robot, points)?.expected(robot, points, known.covariance(), &unit)?;
-        let scatter_m = self.scatter_m(&left.by_reading, points.len());
+        let backlash = self.backlash_m2(&left.by_reading, known.covariance());
+        let scatter_m = self.scatter_m(&left.by_reading, points.len()).map(|m| (m * m + backlash).sqrt());
         let lacking_m = self.part.as_ref().map_or(Some(0.0), |part| {
             let on_tip = fit_points(robot, points)?.tip_point_m;
             let of_whole = |p: &MeasuredPoint| MeasuredPoint {
@@ -107,7 +112,7 @@ impl Stated {
             };
             Some(fit_points(part, &points.iter().map(of_whole).collect::<Vec<_>>())?.rms_m)
         });
-        let expected = self.expectation((left.model_m, lacking_m?), scatter_m)?;
+        let expected = self.expectation(([left.model_m, left.most_model_m], lacking_m?), scatter_m)?;
         // Of so many coordinates, less what frame and reflector take up.
         let count = points.len() as f64;
         let freedom = (3.0 * count - FITTED).max(1.0);
@@ -127,14 +132,24 @@ impl Stated {
         [square, most_of_sum(each.chain([[0.0, chance]]))].map(f64::sqrt)
     }
 
-    /// Of the errors of the model, what a part of it lacks, and the scatter of single stops with the upper end of its interval.
-    fn expectation(&self, (model_m, lacking_m): (f64, f64), scatter_m: [f64; 2]) -> Option<Expectation> {
-        let flange = self.record.flange?;
-        let widening = flange.intervals.map_or(NORMAL_95, |i| i.model_m[1] / flange.model_m);
-        let with = |model_m: f64, scatter_m: f64| model_m.hypot(scatter_m).hypot(lacking_m);
-        let [scatter_m, most_scatter_m] = scatter_m;
-        let found = Expectation { rms_m: with(model_m, scatter_m), most_m: with(widening * model_m, most_scatter_m) };
-        (found.rms_m > 0.0 && found.most_m.is_finite()).then_some(found)
+    /// What backlash does where nobody knows from which side a joint came, by the mean squares that unit noise of every reading makes, m^2:
+    /// `b` to either side.
+    fn backlash_m2(&self, by_reading: &[f64], covariance: &DMatrix<f64>) -> f64 {
+        let FoundModel { robot, .. } = &self.found;
+        let Some(first) = covariance.nrows().checked_sub(robot.terms.len()) else { return 0.0 };
+        let terms = robot.terms.iter().enumerate().filter(|(_, t)| t.term == Term::Backlash);
+        let squares = terms.map(|(k, t)| {
+            by_reading.get(t.reading).map_or(0.0, |by| by * (t.value.powi(2) + covariance[(first + k, first + k)]))
+        });
+        squares.sum()
+    }
+
+    /// Of the errors of the model and of the scatter of single stops, each with the upper end of its 95 % interval, and of what a part of the
+    /// model lacks.
+    fn expectation(&self, (model_m, lacking_m): ([f64; 2], f64), scatter_m: [f64; 2]) -> Option<Expectation> {
+        self.record.flange?;
+        let [rms_m, most_m] = [0, 1].map(|k| model_m[k].hypot(scatter_m[k]).hypot(lacking_m));
+        (rms_m > 0.0 && most_m.is_finite()).then_some(Expectation { rms_m, most_m })
     }
 
     /// Whether one of these files of measurements is an input of the solution, or one of these series shows an exposure of it: files of other

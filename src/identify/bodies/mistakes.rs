@@ -61,18 +61,22 @@ pub(super) fn name_mistake(
         (undone.collect(), kind)
     });
     let undone = read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, (&given, stops)));
-    // In sockets an arm that hardly moves fits without a cause.
-    let undone: Vec<Undone> = undone.filter(|(_, kind)| !hardly_moves(kind) || is_suspicious).collect();
-    let tried = undone.into_par_iter().map(|(undone, kind)| (misfit(robot, &undone) / kind.shrinks(), kind));
     let instrument = &problem.instruments[given[0].instrument];
-    let apart = if instrument.kind == InstrumentKind::Socket { f64::INFINITY } else { usually_apart(&given) };
+    let in_sockets = instrument.kind == InstrumentKind::Socket;
+    let undone: Vec<Undone> = undone.filter(|(_, kind)| !hardly_moves(kind) || is_suspicious).collect();
+    // In sockets an arm that hardly moves fits without a cause: what is left counts by how far the tip moves.
+    let slower = undone.iter().find(|(_, kind)| in_sockets && hardly_moves(kind));
+    let slower = slower.map_or(1.0, |(undone, _)| tip_moves(robot, &given) / tip_moves(robot, undone));
+    let shrinks = |kind: &MistakeKind| if hardly_moves(kind) { kind.shrinks() / slower } else { kind.shrinks() };
+    let tried = undone.into_par_iter().map(|(undone, kind)| (misfit(robot, &undone) / shrinks(&kind), kind));
+    let apart = if in_sockets { f64::INFINITY } else { usually_apart(given.iter().map(|s| s.seen.position())) };
     let explains = |(left, kind): &Explained| {
         let told_by = if hardly_moves(kind) { apart.min(as_described) } else { as_described };
-        *left < limits.mistake_explains * told_by && left * kind.shrinks() < limits.suspicious_misfit
+        *left < limits.mistake_explains * told_by && left * shrinks(kind) < limits.suspicious_misfit
     };
     let explaining: Vec<Explained> = tried.filter(explains).collect();
     likeliest(&explaining, robot, limits).map_or(Ok(()), |(named, kind)| {
-        let left = explaining[named].0 * explaining[named].1.shrinks();
+        let left = explaining[named].0 * shrinks(&explaining[named].1);
         let of = instrument.place();
         let rows_of = rows_of_bodies(adjustment, measured, limits);
         let mistake = Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of };
@@ -85,10 +89,15 @@ const fn hardly_moves(kind: &MistakeKind) -> bool {
     matches!(kind, MistakeKind::Unit { joint: None, are_degrees: true })
 }
 
-/// Median distance of the places from their middle, m.
-fn usually_apart(seen: &[SeenAt]) -> f64 {
-    let middle = seen.iter().map(|s| s.seen.position()).sum::<Vector3<f64>>() / seen.len() as f64;
-    lower_median(seen.iter().map(|s| (s.seen.position() - middle).norm()))
+/// Median distance of places from their middle, m.
+fn usually_apart(places: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) -> f64 {
+    let middle = places.clone().sum::<Vector3<f64>>() / places.len() as f64;
+    lower_median(places.map(|place| (place - middle).norm()))
+}
+
+/// The same of the tip, m.
+fn tip_moves(robot: &Robot, at: &[SeenAt]) -> f64 {
+    usually_apart(at.iter().map(|s| robot.base_from_tip(&s.readings).translation))
 }
 
 /// True where a misfit is many times what is stated, of measurements enough to tell a mistake from chance.
