@@ -19,6 +19,7 @@ mod causes;
 mod controller_poses;
 mod coverage;
 mod diagnosis;
+mod few_points;
 mod knowledge;
 mod lens_study;
 mod marker_tolerance;
