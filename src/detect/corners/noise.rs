@@ -81,6 +81,5 @@ pub(super) fn covariance(correlation: &Correlation, corner: &Saddle) -> [f64; 3]
 fn of_terms(correlation: &Correlation, corner: &Saddle) -> Matrix2<f64> {
     let terms = corner.terms();
     let at: Vec<[i32; 2]> = terms.iter().map(|term| term.at).collect();
-    let raster = Raster::new(&at);
-    correlation.covariance(&raster, &[0, 1].map(|axis| raster.plane(|k| terms[k].influence[axis])))
+    correlation.covariance(&Raster::new(&at), |k| terms[k].influence)
 }

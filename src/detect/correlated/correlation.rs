@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, SMatrix};
 
-use super::raster::{LAGS, NONE, REACH, Raster, SIDE};
-use crate::linalg::{add_combination, sum_of_products, wide};
+use super::raster::{LAGS, NONE, REACH, Raster, SIDE, UNKNOWN};
+use crate::linalg::{sum_of_products, wide};
 
 /// Least variance of a place in any direction over that with noise of the same size that is not correlated.
 const LEAST_SHARE: f64 = 0.25;
@@ -41,28 +41,37 @@ impl Correlation {
         self.0[NONE] + 2.0 * self.0[NONE + 1..].iter().sum::<f64>()
     }
 
-    /// `sum_p sum_l psi_p psi_(p + l)' rho(l)` over planes of influences `psi`: the covariance of what they are the influences on.
+    /// `sum_p sum_l psi_p psi_(p + l)' rho(l)` over the influences `psi` of pixels: the covariance of what they are the influences on.
     pub(in crate::detect) fn covariance<const N: usize>(
         &self,
         raster: &Raster,
-        planes: &[Vec<f64>; N],
+        psi: impl Fn(usize) -> [f64; N],
     ) -> SMatrix<f64, N, N> {
+        let plane = raster.with_room(0, [0.0; N], psi);
         // Of each lag and its opposite, one stands for both.
-        let mut moved = planes.each_ref().map(|plane| vec![0.0; plane.len()]);
-        let one_sided: SMatrix<f64, N, N> = wide(
+        let weights: [(usize, f64); UNKNOWN] = std::array::from_fn(|lag| {
+            (raster.ahead(NONE + lag), if lag == 0 { self.0[NONE] } else { 2.0 * self.0[NONE + lag] })
+        });
+        let mut sums = [[0.0; N]; N];
+        wide(
             #[inline(always)]
-            || {
-                for (lag, correlation) in self.0.iter().enumerate().skip(NONE) {
-                    let (ahead, weight) =
-                        (raster.ahead(lag), if lag == NONE { *correlation } else { 2.0 * correlation });
-                    for (moved, plane) in moved.iter_mut().zip(planes) {
-                        add_combination(moved, [&plane[ahead..]], [weight]);
-                    }
-                }
-                SMatrix::from_fn(|i, j| sum_of_products(&planes[i], &moved[j]))
-            },
+            || raster.cells_of_pixels().for_each(|cell| add_pairs(&mut sums, &plane[cell..], &weights)),
         );
+        let one_sided = SMatrix::<f64, N, N>::from_fn(|i, j| sums[i][j]);
         (one_sided + one_sided.transpose()) * 0.5
+    }
+}
+
+/// Adds the products of the first row and the sum of those ahead of it by these weights.
+#[inline(always)]
+fn add_pairs<const N: usize>(sums: &mut [[f64; N]; N], rows: &[[f64; N]], weights: &[(usize, f64)]) {
+    let mut ahead = [0.0; N];
+    for (at, weight) in weights {
+        let row = &rows[*at];
+        (0..N).for_each(|i| ahead[i] += weight * row[i]);
+    }
+    for (sums, own) in sums.iter_mut().zip(&rows[0]) {
+        (0..N).for_each(|i| sums[i] += own * ahead[i]);
     }
 }
 

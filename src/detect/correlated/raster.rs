@@ -8,6 +8,9 @@ pub(in crate::detect) const LAGS: usize = (REACH as usize + 1) * SIDE;
 /// Number of the lag of none.
 pub(in crate::detect) const NONE: usize = REACH as usize;
 
+/// The lag of none and those after it.
+pub(super) const UNKNOWN: usize = LAGS - NONE;
+
 /// Number of a lag or its opposite; `None` where it is beyond reach.
 pub(super) fn number([x, y]: [i32; 2]) -> Option<usize> {
     let [x, y] = if y < 0 || (y == 0 && x < 0) { [-x, -y] } else { [x, y] };
@@ -49,7 +52,46 @@ impl<'a> Raster<'a> {
     /// A value of every pixel at its place, 0 where there is none: two planes, the second from `ahead(lag)` on, hold the values of every two pixels
     /// at that lag beside each other.
     pub fn plane(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
-        self.cells.iter().map(|cell| (*cell as usize).checked_sub(1).map_or(0.0, &value)).collect()
+        self.with_room(0, 0.0, value)
+    }
+
+    /// The same with so much room before it, and what stands where there is no pixel.
+    pub fn with_room<T: Copy>(&self, room: usize, none: T, value: impl Fn(usize) -> T) -> Vec<T> {
+        let mut plane = vec![none; room + self.cells.len()];
+        (0..self.at.len()).for_each(|k| plane[room + self.cell(k)] = value(k));
+        plane
+    }
+
+    /// Room before a plane in which no opposite of a lag leaves it.
+    pub fn room(&self) -> usize {
+        self.ahead(LAGS - 1)
+    }
+
+    /// Place of a pixel in a plane.
+    pub fn cell(&self, pixel: usize) -> usize {
+        let [x, y] = self.at[pixel];
+        ((y - self.low[1]) * self.width + x - self.low[0]) as usize
+    }
+
+    /// Places of all pixels.
+    pub fn cells_of_pixels(&self) -> impl Iterator<Item = usize> {
+        (0..self.at.len()).map(|pixel| self.cell(pixel))
+    }
+
+    /// The value at a pixel, and for every lag after that of none the sum of those there and at its opposite, in a plane with [`Self::room`].
+    #[inline(always)]
+    pub fn around(&self, plane: &[f64], pixel: usize) -> [f64; UNKNOWN] {
+        let (here, width) = (self.room() + self.cell(pixel), self.width as usize);
+        let side = |from: usize| -> &[f64] { &plane[from - NONE..][..SIDE] };
+        let mut sums = [0.0; UNKNOWN];
+        sums[0] = plane[here];
+        let row = side(here);
+        (1..=NONE).for_each(|x| sums[x] = row[NONE + x] + row[NONE - x]);
+        for (y, sums) in (1..).zip(sums[NONE + 1..].chunks_exact_mut(SIDE)) {
+            let (ahead, before) = (side(here + y * width), side(here - y * width));
+            (0..SIDE).for_each(|x| sums[x] = ahead[x] + before[SIDE - 1 - x]);
+        }
+        sums
     }
 
     /// Places from a pixel to that at a lag, not before that of none.
@@ -59,11 +101,10 @@ impl<'a> Raster<'a> {
 
     /// Calls `pair` with the number of a lag that is not zero and the indices of every two pixels at it.
     pub fn for_pairs(&self, mut pair: impl FnMut(usize, usize, usize)) {
-        for (k, [x, y]) in self.at.iter().enumerate() {
-            let cell = (y - self.low[1]) * self.width + x - self.low[0];
-            for lag in REACH as usize + 1..LAGS {
-                let (down, right) = ((lag / SIDE) as i32, (lag % SIDE) as i32 - REACH);
-                let other = self.cells[(cell + down * self.width + right) as usize] as usize;
+        for k in 0..self.at.len() {
+            let cell = self.cell(k);
+            for lag in NONE + 1..LAGS {
+                let other = self.cells[cell + self.ahead(lag)] as usize;
                 if other > 0 {
                     pair(lag, k, other - 1);
                 }

@@ -120,9 +120,9 @@ impl Pixels {
         self.value.extend_from_slice(values);
     }
 
-    /// Column and row of every pixel.
+    /// Column and row of every pixel; they are whole numbers.
     pub fn places(&self) -> Vec<[i32; 2]> {
-        self.x.iter().zip(&self.y).take(self.count).map(|(x, y)| [x.round() as i32, y.round() as i32]).collect()
+        self.x.iter().zip(&self.y).take(self.count).map(|(x, y)| [*x as i32, *y as i32]).collect()
     }
 
     /// Weighted derivatives of the pixels by a parameter.

@@ -36,8 +36,7 @@ impl<const N: usize> Influences<N> {
     fn covariance(&self, correlation: &Correlation) -> SMatrix<f64, N, N> {
         let beyond = correlation.less_white();
         let raster = Raster::new(&self.at);
-        let planes = self.psi.each_ref().map(|psi| raster.plane(|k| f64::from(psi[k])));
-        let in_band = beyond.covariance(&raster, &planes);
+        let in_band = beyond.covariance(&raster, |k| self.psi.each_ref().map(|psi| f64::from(psi[k])));
         sound(self.white, self.white + in_band + self.beside * beyond.of_a_mean()) * self.scale
     }
 }

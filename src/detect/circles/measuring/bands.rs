@@ -72,9 +72,11 @@ impl Bands {
         let most = DISTURBED * median(self.left.iter().map(|(misfit, _)| *misfit)).unwrap_or(0.0);
         let mut sums = Seen::NOTHING;
         self.left.iter().filter(|(misfit, _)| *misfit <= most).for_each(|(_, seen)| sums.add(seen));
-        let parts = self.parts.iter().filter(|(misfit, _)| *misfit <= most).map(|(_, part)| part);
-        let found = if sums.pixels() < LEAST_PIXELS { None } else { sums.unfollowed(parts, &Correlation::WHITE) };
-        found.map_or(Correlation::WHITE, |found| found.shrunk())
+        let parts = || self.parts.iter().filter(|(misfit, _)| *misfit <= most).map(|(_, part)| part);
+        if sums.pixels() < LEAST_PIXELS || sums.is_white(parts()) {
+            return Correlation::WHITE;
+        }
+        sums.unfollowed(parts(), &Correlation::WHITE).map_or(Correlation::WHITE, |found| found.shrunk())
     }
 
     /// States the covariances of all markers, in their order.
