@@ -109,7 +109,7 @@ struct Meaning<'a> {
     found: Vec<Found>,
     /// Ways that were followed, by the target from which they come: the target, the number of the arrival, and where it begins.
     followed: BTreeMap<Option<usize>, BTreeSet<(usize, usize, Approach)>>,
-    /// True where a way was followed since this was asked.
+    /// True where a way was followed since this was asked, or is to be followed once more.
     has_more: bool,
 }
 
@@ -210,6 +210,7 @@ impl Meaning<'_> {
         if least != known.told {
             known.told = least;
             self.followed.remove(&Some(k));
+            self.has_more = true;
         }
     }
 

@@ -310,6 +310,23 @@ fn the_rail_is_told_behind_a_joint_target_only_where_all_ways_to_it_tell_it() {
     }
 }
 
+/// The posture of the third pose is found to be open only once the last target is known: behind that, nothing tells the rail at the second one.
+#[test]
+fn a_way_that_is_found_late_counts_for_targets_that_stand_before_it_in_the_text() {
+    let robot = on_rail();
+    let at = |more: &str| krl_frame(&pose(&robot, 0.5), more);
+    let [arm, told] = ["", ",E1 500.0"].map(|more| format!("PTP {}\n", axes(more)));
+    let [a1, a2, a3, a4, a5, a6] = START.map(f64::to_degrees);
+    let [a4, a6] = [a4, a6].map(|q| q - 180.0 * q.signum());
+    let turned = format!("PTP {{A1 {a1},A2 {a2},A3 {a3},A4 {a4},A5 {:.6},A6 {a6},E1 500.0}}\n", -a5);
+    for (last, counts) in [(&told, true), (&turned, false)] {
+        let within = format!("WHILE $IN[3]\nPTP {}\nIF $IN[4] THEN\n{last}ENDIF\nENDWHILE\n", at(",E1 500.0"));
+        let around = format!("LOOP\n{arm}IF $IN[2] THEN\nEXIT\nENDIF\n{within}ENDLOOP\n");
+        let text = format!("{BEGIN}{told}WHILE $IN[1]\nLIN {}\n{around}ENDWHILE\nEND\n", at(""));
+        assert_eq!(is_met(&robot, "a.src", &text), counts, "{text}");
+    }
+}
+
 /// The words of targets that stay as they are offer `--start` where it tells the rail, and nowhere else.
 #[test]
 fn start_is_offered_where_it_would_tell_the_rail() {
