@@ -370,6 +370,37 @@ fn the_end_of_a_circle_does_not_take_the_rail_from_the_point_on_it() {
     }
 }
 
+/// An end of which the text does not tell where it stands does not leave the rail out; elements of an array are looked at one by one.
+#[test]
+fn the_end_of_a_circle_that_is_an_element_or_computed_is_left_only_where_it_leaves_the_rail_out() {
+    let robot = on_rail();
+    let at = |eax: &str| robtarget(&pose(&robot, 0.5), eax);
+    let data = |eax: &str| format!("CONST robtarget pEnds{{2}}:=[{},{}];\nVAR robtarget pLater;\n", at("500"), at(eax));
+    let circle = |end: &str, eax: &str| {
+        module(&format!("MoveC {},{end},v10,fine,tool0;\nENDPROC\n{}PROC q()\n", at("500"), data(eax)))
+    };
+    for (end, reason) in [
+        ("pEnds{i}", None),
+        ("pEnds{1}", None),
+        ("pNone", Some(LeftReason::Undeclared)),
+        ("pLater", Some(LeftReason::Computed)),
+        ("CalcRobT(j,tool0)", Some(LeftReason::Computed)),
+    ] {
+        let text = circle(end, "500");
+        let left = read_program(&robot.0, &[1, 2, 3, 4, 5, 6, 0], "m.mod", &text).left;
+        let reasons = left.iter().map(|left| left.why.reason).filter(|reason| *reason != LeftReason::Unvisited);
+        assert_eq!(reasons.collect::<Vec<_>>(), Vec::from_iter(reason), "{text}");
+    }
+    for (eax, is_told) in [("500", true), ("9E9", false)] {
+        let text = circle("pEnds{i}", eax);
+        let (line, found) = (first_line(&text, "CONST"), corrected(&robot, "m.mod", &text, Some(0.5)));
+        match is_told {
+            true => assert_meets_at(&robot, &found, line, 0.5, &text),
+            false => assert_eq!(found[&line], Err(LeftReason::Incomplete), "{text}"),
+        }
+    }
+}
+
 /// A segment of a spline may leave external axes where they are best.
 #[test]
 fn a_segment_that_ignores_external_axes_is_left() {

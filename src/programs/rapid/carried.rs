@@ -53,8 +53,10 @@ impl Task<'_> {
     /// Refuses the end of a circle that leaves out an axis of the description which the point on it has: that stands where it stood before that point.
     pub(super) fn tells_axes_of(&self, end: &Node, on_circle: &Node) -> Understood<()> {
         let known = self.setting.external_axes();
-        let named = |value: &Node| self.places_of(value).unwrap_or_default().into_iter().map(|(axis, _)| axis);
-        let missing = named(on_circle).find(|axis| *axis < known && named(end).all(|told| told != *axis));
+        // An end that the text does not tell is left as such, and elements of an array are looked at one by one.
+        let (Some(on_circle), Some(end)) = (self.places_of(on_circle), self.places_of(end)) else { return Ok(()) };
+        let is_missing = |axis: &usize| *axis < known && end.iter().all(|(told, _)| told != axis);
+        let missing = on_circle.into_iter().map(|(axis, _)| axis).find(is_missing);
         let why = missing.map(|axis| {
             let axis = external_name(axis);
             Why::new(
