@@ -270,6 +270,33 @@ fn the_first_target_of_main_has_the_rail_of_its_end_in_all_cycles_but_the_first(
     }
 }
 
+/// An axis that is moved independently of the targets at the end of `main` is so where that begins again.
+#[test]
+fn what_the_end_of_main_moves_independently_is_moved_so_where_it_begins_again() {
+    let robot = on_rail();
+    let target = robtarget(&pose(&robot, 0.5), "500,0,0,0,0,0").replace(",9E9,9E9,9E9,9E9,9E9]", "]");
+    let go = format!("MoveL {target},v10,fine,tool0;\n");
+    let alone = "IndAMove STN1,1\\ToAbsNum:=560,20;\n";
+    let routine = format!("ENDPROC\nPROC rEnd()\n{alone}");
+    for (body, is_alone) in [
+        (go.clone(), false),
+        (format!("{go}{alone}"), true),
+        (format!("{go}{alone}IndReset STN1,1;\n"), false),
+        (format!("IndReset STN1,1;\n{go}{alone}"), false),
+        (format!("IndReset STN1,2;\n{go}{alone}"), true),
+        (format!("{go}{alone}EXIT;\n"), false),
+        (format!("{go}IF a=1 THEN\n{alone}RETURN;\nENDIF\nIndReset STN1,1;\n"), true),
+        (format!("{go}rEnd;\n{routine}"), true),
+        (format!("{go}rEnd;\nEXIT;\n{routine}"), false),
+        (format!("{go}WHILE TRUE DO\nrEnd;\nENDWHILE\n{routine}ExitCycle;\n"), true),
+    ] {
+        let text = module(&body);
+        let found = corrected(&robot, "m.mod", &text, Some(0.5));
+        let reason = found[&first_line(&text, "MoveL")].as_ref().err();
+        assert_eq!(reason, is_alone.then_some(&LeftReason::ExternalAxis), "{text}");
+    }
+}
+
 /// Behind axis angles that leave the rail out, the numbers that a pose leaves out are told only where the rail is.
 #[test]
 fn a_partial_pose_is_completed_only_where_the_rail_before_it_is_told() {

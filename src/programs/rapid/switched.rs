@@ -149,6 +149,11 @@ impl Switched {
         self.beside.or_left_by(&end.beside);
     }
 
+    /// Where `main` begins again behind an end of it: axes that are moved independently of the targets go on so.
+    pub fn moves_on_from(&mut self, end: &Self) {
+        self.independent.begin(self.independent.value().either(end.independent.value()));
+    }
+
     /// The same where any statement of the routine may have been the last one: it began with `top`, which has noted all that it passed through.
     pub fn anywhere(self, top: &Self) -> Self {
         let [joints, paths] = self.watched;

@@ -196,8 +196,11 @@ impl Switching {
                 self.now = self.now.merged(&uncalled, "");
                 self.cycle.begins(is_main && !self.flow.is_called(&routine_name(reader)));
                 if self.cycle.is_main {
-                    let again = self.flow.passed(AGAIN).map(|(_, stands)| stands.merged(&Stands::begin(), ""));
-                    self.now.1 = again.unwrap_or_else(Stands::begin);
+                    self.now.1 = Stands::begin();
+                    if let Some((left, stands)) = self.flow.passed(AGAIN) {
+                        self.now.0.moves_on_from(left);
+                        self.now.1 = self.now.1.merged(stands, "");
+                    }
                 }
                 self.top = self.now.0.clone();
                 (self.handler, self.may_have_failed) = (None, false);
