@@ -264,6 +264,11 @@ fn the_first_target_of_main_has_the_rail_of_its_end_in_all_cycles_but_the_first(
         (format!("{go}WHILE TRUE DO\nrOut;\nENDWHILE\nENDPROC\nPROC rOut()\n{}ExitCycle;\n", at("700")), false),
         (format!("{go}{}Stop;\nEXIT;\n", at("700")), true),
         (format!("{}{go}{}", at("500"), at("700")), true),
+        // Its end is that of its body, too, not of its handler alone.
+        (format!("{go}{}ERROR\nRAISE;\n", at("700")), false),
+        (format!("{go}{}ERROR\nRAISE;\n", at("500")), true),
+        (format!("{go}{}EXIT;\nERROR\nRAISE;\n", at("700")), true),
+        (format!("{go}WHILE TRUE DO\n{}ENDWHILE\nERROR\nRAISE;\n", at("700")), true),
     ] {
         let text = module(&body);
         assert_eq!(is_met(&robot, "m.mod", &text), counts, "{text}");

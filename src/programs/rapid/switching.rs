@@ -210,11 +210,7 @@ impl Switching {
                 }
             }
             "ENDPROC" | "ENDFUNC" | "ENDTRAP" => {
-                let is_endless = self.cycle.is_endless && self.handler.is_none();
                 self.part_ends();
-                if !is_endless {
-                    self.begins_again();
-                }
                 self.flow.routine_ends(&mut self.now);
             }
             "IF" => self.begin(Branching::If, way),
@@ -261,9 +257,13 @@ impl Switching {
 
     /// The body of a routine, or its handler of errors, is read to its end.
     fn part_ends(&mut self) {
+        let is_endless = self.cycle.is_endless && self.handler.is_none();
         self.goes_on_behind_failure();
         self.now = self.since_routine_began();
         self.handler = None;
+        if !is_endless {
+            self.begins_again();
+        }
     }
 
     /// What holds here seen from the routine, in its handler as well.
