@@ -25,3 +25,4 @@ mod grids;
 mod image_stage;
 mod puzzleboards;
 mod tags;
+mod tags_disturbed;
