@@ -67,6 +67,12 @@ const AT_REST_PX: f64 = 1e-4;
 const NEARLY_AT_REST_PX: f64 = 5e-3;
 /// Prior sigma of a level, as a share of the contrast at the start: paper that is clipped does not tell its own.
 const LEVEL: f64 = 0.3;
+/// The same of the step to paper that is clipped: it is seen as the least that it may be.
+const CLIPPED_LEVEL: f64 = 1.0;
+/// What an edge of another shape leaves, as a share of the step: it is alike all along a side, and the fit of its pixels takes it for so many
+/// numbers. Where all of the edge is seen it moves a side by less than print and lens do; where paper is clipped, half of the step is an extrapolation.
+const OTHER_SHAPE: f64 = 0.003;
+const OF_AN_EDGE: f64 = 8.0;
 /// Prior sigma of a slope of the light along the side, as a share of the contrast per px; it may change by itself over the side.
 const SLOPE_PER_PX: f64 = 0.01;
 /// What lies beyond ink and paper is seen so many blurs before it: at two by 2 % of the contrast.
@@ -417,7 +423,7 @@ fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column)
         (3, 0.0, part * third),
         (4, 0.0, part * fourth),
         (BLUR, USUAL_BLUR_PX.ln(), BLUR_SIGMA),
-        (STEP, first[STEP], level),
+        (STEP, first[STEP], if pixels.iter().any(|p| p.saturated) { CLIPPED_LEVEL * first[STEP] } else { level }),
         (STEP + 1, 0.0, slope),
         (DARK, first[DARK], level),
         (DARK + 1, 0.0, slope),
@@ -452,7 +458,11 @@ fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column)
         let rest = if round < MOST_STEPS { AT_REST_PX } else { NEARLY_AT_REST_PX };
         if moved_px(&step, length)[0] < rest {
             let (contrast, paper_residual) = (state[STEP], (paper.0 / paper.1.max(1.0)).sqrt());
-            let covariance = factor.inverse().fixed_view::<SHAPE, SHAPE>(0, 0).into_owned();
+            let mut covariance = factor.inverse().fixed_view::<SHAPE, SHAPE>(0, 0).into_owned();
+            if used < pixels.len() {
+                let of_shape = (OTHER_SHAPE * contrast / noise).powi(2) * used as f64 / OF_AN_EDGE;
+                covariance[(0, 0)] *= 1.0 + of_shape;
+            }
             let fit = Fit {
                 covariance,
                 common: 0.0,
