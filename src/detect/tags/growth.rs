@@ -33,9 +33,9 @@ const FAR_SIGMAS: f64 = 2.5;
 const ROUNDS: usize = 12;
 /// A solution that changes less has settled, px.
 const SETTLED_PX: f64 = 1e-5;
-/// Of a component of `q`, by their order from 0 to 5: only the first three do not vanish at the corners.
-const ORDERS: [usize; 6] = [1, 2, 2, 4, 5, 6];
-const TERMS: usize = 20;
+/// Of a component of `q`, by their order from 0 to 5: only the first four do not vanish at the corners.
+const ORDERS: [usize; 7] = [1, 2, 1, 2, 4, 5, 6];
+const TERMS: usize = 21;
 type Terms = SVector<f64, TERMS>;
 /// Prior sigma of `g`, px: none, but that sides alone do not tell it.
 const GROWN_PX: f64 = 100.0;
@@ -130,7 +130,7 @@ impl Outlined<'_> {
     fn priors(&self, picture: &Picture) -> Terms {
         let half = (0..4).map(|k| distance(self.corners[k], self.corners[(k + 1) % 4])).sum::<f64>() / 8.0;
         let bent = (2..).zip(bends(picture)).map(|(order, bend)| (bend * half.powi(order)).powi(2));
-        let of_orders = [self.variance; 2].into_iter().chain(bent);
+        let of_orders = [self.variance; 3].into_iter().chain(bent);
         let all = ORDERS.into_iter().zip(of_orders).flat_map(|(count, variance)| std::iter::repeat_n(variance, count));
         Terms::from_iterator(all)
     }
@@ -173,7 +173,7 @@ impl Place {
         let [x, y] = at;
         let (bow_x, bow_y) = (1.0 - x * x, 1.0 - y * y);
         let (xx, xy, yy) = (bow_x * bow_x, bow_x * bow_y, bow_y * bow_y);
-        let first = [1.0, x, y];
+        let first = [1.0, x, y, x * y];
         let third = [bow_x, bow_y, x * bow_x, x * bow_y, y * bow_x, y * bow_y];
         let fifth = [xx, xy, yy, x * y * bow_x, x * y * bow_y, x * xx, x * xy, x * yy, y * xx, y * xy, y * yy];
         let terms = Terms::from_iterator(first.into_iter().chain(third).chain(fifth)) * to_light;

@@ -307,13 +307,17 @@ impl<'a> Board<'a> {
         if self.tags.gap_m > 0.0 { self.tags.gap_m / self.tags.side_m * self.reader.side() as f64 } else { 1.0 }
     }
 
-    /// How far ink reaches beyond its place, of the tags that say it.
+    /// How far ink reaches beyond its place, of the tags that say it. Where none of them has all four corners, as where the border of the picture
+    /// cuts a side, those that are missing are taken as they were seen.
     fn grown(&self, found: &Found, sides: &Sides) -> BTreeMap<usize, Growth> {
         if self.tags.print == TagPrint::Kalibr {
             return self.grown_beside_squares(found, sides);
         }
-        let of_code = |(place, four): (&usize, &[Measured; 4])| {
-            let corner = |k: usize| crossing(four[(k + 3) % 4], four[k], found[place][k]).ok();
+        let of_code = |(place, four): (&usize, &[Measured; 4]), rough: Option<f64>| {
+            let corner = |k: usize| {
+                let rough = rough.map(|px| (found[place][k], [px * px, 0.0, px * px]));
+                crossing(four[(k + 3) % 4], four[k], found[place][k]).ok().or(rough)
+            };
             let corners = [corner(0)?, corner(1)?, corner(2)?, corner(3)?];
             let contrast = median(four.iter().flatten().map(EdgeLine::contrast))?;
             let variance = corners.iter().map(|(_, c)| c[0] + c[2]).sum::<f64>() / 8.0;
@@ -322,7 +326,12 @@ impl<'a> Board<'a> {
                 Outlined { printed: &printed, corners: corners.map(|(uv, _)| uv), variance, contrast, sides: four };
             Some((*place, tag.growth(self.picture, self.smoothing_px)?))
         };
-        sides.iter().filter_map(of_code).collect()
+        let whole: BTreeMap<usize, Growth> = sides.iter().filter_map(|tag| of_code(tag, None)).collect();
+        if whole.is_empty() {
+            sides.iter().filter_map(|tag| of_code(tag, Some(ENDS_SPARE_PX))).collect()
+        } else {
+            whole
+        }
     }
 
     /// Where a side of a tag of an AprilGrid ends, the side of a dark square goes on with its ink on the other side, so that what moves both
