@@ -282,7 +282,7 @@ fn tags_that_the_border_cuts_are_measured_in_encoded_light() {
     assert!(cut.rms() < 0.1 && cut.normalised() < 2.0, "{}", cut.said());
 }
 
-/// Where paper is clipped by as much as it is light, half of the step is not seen.
+/// Where paper is lighter than the sensor can say, half of the step may not be seen.
 #[test]
 fn tags_in_a_clipped_spot_are_as_uncertain_as_stated() {
     for board in &BOARDS[2..] {

@@ -69,9 +69,10 @@ const NEARLY_AT_REST_PX: f64 = 5e-3;
 const LEVEL: f64 = 0.3;
 /// The same of the step to paper that is clipped: it is seen as the least that it may be.
 const CLIPPED_LEVEL: f64 = 1.0;
-/// What an edge of another shape leaves, as a share of the step: it is alike all along a side, and the fit of its pixels takes it for so many
-/// numbers. Where all of the edge is seen it moves a side by less than print and lens do; where paper is clipped, half of the step is an extrapolation.
-const OTHER_SHAPE: f64 = 0.003;
+/// What an edge of another shape leaves, as a share of the step: the area of a pixel at a blur of 0.3 px. It is alike all along a side, where it says
+/// so many numbers. Where all of the edge is seen it moves a side by less than print and lens do; where paper is clipped, half of the step is an
+/// extrapolation.
+const OTHER_SHAPE: f64 = 0.005;
 const OF_AN_EDGE: f64 = 8.0;
 /// Prior sigma of a slope of the light along the side, as a share of the contrast per px; it may change by itself over the side.
 const SLOPE_PER_PX: f64 = 0.01;
