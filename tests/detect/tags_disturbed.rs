@@ -25,6 +25,11 @@ const BOARDS: [(&str, f64, &str); 4] = [
     ),
 ];
 
+/// Grids are of smaller tags than those that stand alone.
+fn is_grid(tag_m: f64) -> bool {
+    tag_m < 0.1
+}
+
 fn plate(text: &str) -> Plate {
     parse_plate(Path::new("plate.toml"), &format!("format = 1\n{text}\n"), "").unwrap()
 }
@@ -104,8 +109,8 @@ impl Scene {
 }
 
 /// A tag of 20 to 300 px, or a grid of tags of 25 to 110 px.
-fn view(name: &str, tag_m: f64, rng: &mut ChaCha8Rng) -> View {
-    let is_grid = name.contains("grid");
+fn view(tag_m: f64, rng: &mut ChaCha8Rng) -> View {
+    let is_grid = is_grid(tag_m);
     let least: f64 = if is_grid { 25.0 } else { 20.0 };
     let side_px = (rng.random_range(0.0..1.0) * (if is_grid { 110.0 } else { 300.0 } / least).ln()).exp() * least;
     let focal_px = rng.random_range(500.0..800.0);
@@ -208,9 +213,9 @@ fn at_border(board: (&str, f64, &str), seeds: std::ops::Range<u64>, power: f64) 
     let mut tallies = [Tally::default(), Tally::default()];
     for seed in seeds {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut scene = scene_of(board, &view(board.0, board.1, &mut rng));
-        let is_grid = board.0.contains("grid");
-        let within_px = if is_grid { rng.random_range(-5.0..5.0) } else { rng.random_range(-1.0..6.0) };
+        let mut scene = scene_of(board, &view(board.1, &mut rng));
+
+        let within_px = if is_grid(board.1) { rng.random_range(-5.0..5.0) } else { rng.random_range(-1.0..6.0) };
         scene.to_border(&mut rng, within_px);
         let inside = |id: u32| scene.corner(id).map_or(-1e9, |p| scene.within(&p));
         let asked = |id: u32| usize::from(inside(id) > 0.0);
@@ -238,7 +243,7 @@ fn in_highlight(board: (&str, f64, &str), seeds: std::ops::Range<u64>, is_glare:
     let mut tallies = [Tally::default(), Tally::default()];
     for seed in seeds {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut view = view(board.0, board.1, &mut rng);
+        let mut view = view(board.1, &mut rng);
         let reach = 0.2 * view.distance_m * 600.0 / view.focal_px;
         view.aim_m = [rng.random_range(-reach..reach), rng.random_range(-reach..reach)];
         let at_px = [rng.random_range(250.0..550.0), rng.random_range(150.0..450.0)];
