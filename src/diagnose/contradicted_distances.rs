@@ -43,6 +43,9 @@ pub struct ContradictedDistances {
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<ContradictedDistances> {
     let (lengths, limits) = (&fit.problem.lengths, setting.limits);
+    if lengths.is_empty() {
+        return Vec::new();
+    }
     let Ok(covariance) = fit.own_covariance() else { return Vec::new() };
     let misfits = fit.adjustment.length_misfits(&covariance);
     let count = misfits.len();

@@ -38,7 +38,8 @@ pub(super) fn leave_worst_out(outcome: &mut Outcome, limits: &Limits) -> bool {
 
 /// Of a fit that converged; else none.
 fn misfits(outcome: &Outcome) -> Vec<LengthMisfit> {
-    let linear = outcome.linear().filter(|_| outcome.status == Status::Converged);
+    let has_any = !outcome.adjustment.problem.lengths.is_empty();
+    let linear = outcome.linear().filter(|_| has_any && outcome.status == Status::Converged);
     let covariance = linear.and_then(|linear| LinearProblem::covariance(linear).ok());
     covariance.map_or_else(Vec::new, |covariance| outcome.adjustment.length_misfits(&covariance))
 }
