@@ -58,11 +58,10 @@ impl SymmetricFactor {
             return Err(NotPositiveDefinite { row: m.nrows().min(m.ncols()) });
         }
         let scale = m.diagonal().map(|d| 1.0 / d.sqrt());
-        let mut scaled = scaled_lower(m, &scale);
-        if !scaled.iter().all(|x| x.is_finite()) {
+        let Some(mut scaled) = scaled_lower(m, &scale) else {
             let is_finite = |i: usize| (0..m.ncols()).all(|j| (m[(i, j)] * scale[i] * scale[j]).is_finite());
             return Err(NotPositiveDefinite { row: (0..m.nrows()).find(|i| !is_finite(*i)).unwrap_or_default() });
-        }
+        };
         let needed = factor::cholesky_in_place_scratch::<f64>(m.nrows(), Par::Seq, Default::default());
         let (mut memory, options) = (MemBuffer::new(needed), Default::default());
         factor::cholesky_in_place(
@@ -221,16 +220,17 @@ pub fn add_gram(a: &mut DMatrix<f64>, y: &DMatrix<f64>, factor: f64) {
     });
 }
 
-/// `m` with its diagonal scaled to one: lower triangle, zeros above.
-fn scaled_lower(m: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+/// `m` with its diagonal scaled to one: lower triangle, zeros above. `None` where something in it is not finite.
+fn scaled_lower(m: &DMatrix<f64>, scale: &DVector<f64>) -> Option<DMatrix<f64>> {
     let n = m.nrows();
-    let mut scaled = DMatrix::zeros(n, n);
+    let (mut scaled, mut is_finite) = (DMatrix::<f64>::zeros(n, n), true);
     let columns = scaled.as_mut_slice().chunks_exact_mut(n.max(1)).zip(m.as_slice().chunks_exact(n.max(1)));
     for (j, (into, of)) in columns.enumerate() {
         let values = of[j..].iter().zip(&scale.as_slice()[j..]);
         into[j..].iter_mut().zip(values).for_each(|(x, (value, own))| *x = value * own * scale[j]);
+        is_finite &= into[j..].iter().fold(true, |all, x| all & x.is_finite());
     }
-    scaled
+    is_finite.then_some(scaled)
 }
 
 /// Rows and columns of the squares in which a triangle is copied to the other: both stay in the nearest cache.
@@ -238,21 +238,29 @@ const SQUARE: usize = 32;
 
 /// Copies the upper triangle to the lower one.
 pub fn mirror_upper(a: &mut DMatrix<f64>) {
-    each_pair(a, |values, above, below| values[below] = values[above]);
+    let rows = a.nrows();
+    mirror_upper_rows(a, rows);
+}
+
+/// Copies the first rows of the upper triangle to the lower one.
+pub fn mirror_upper_rows(a: &mut DMatrix<f64>, rows: usize) {
+    each_pair(a, rows, |values, above, below| values[below] = values[above]);
 }
 
 /// Copies the lower triangle to the upper one.
-fn mirror_lower(a: &mut DMatrix<f64>) {
-    each_pair(a, |values, above, below| values[above] = values[below]);
+pub fn mirror_lower(a: &mut DMatrix<f64>) {
+    let rows = a.nrows();
+    each_pair(a, rows, |values, above, below| values[above] = values[below]);
 }
 
-/// Goes through the places of a square matrix above the diagonal, each with its place below.
-fn each_pair(a: &mut DMatrix<f64>, pair: impl Fn(&mut [f64], usize, usize)) {
+/// Goes through the places of a square matrix above the diagonal in its first rows, each with its place below.
+fn each_pair(a: &mut DMatrix<f64>, rows: usize, pair: impl Fn(&mut [f64], usize, usize)) {
     let n = a.ncols();
     let values = a.as_mut_slice();
-    for (first_column, first_row) in (0..n).step_by(SQUARE).flat_map(|j| (0..=j).step_by(SQUARE).map(move |i| (j, i))) {
+    let squares = (0..n).step_by(SQUARE).flat_map(|j| (0..rows.min(j + 1)).step_by(SQUARE).map(move |i| (j, i)));
+    for (first_column, first_row) in squares {
         for j in first_column..(first_column + SQUARE).min(n) {
-            (first_row..(first_row + SQUARE).min(j)).for_each(|i| pair(values, j * n + i, i * n + j));
+            (first_row..(first_row + SQUARE).min(rows.min(j))).for_each(|i| pair(values, j * n + i, i * n + j));
         }
     }
 }

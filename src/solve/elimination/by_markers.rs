@@ -16,7 +16,7 @@ use super::marker_rows::{ImageRows, MarkerBlock, MarkerRows, times_right};
 use super::pose_space::PoseSpace;
 use super::right_hand_sides::RightHandSides;
 use super::seen_markers::SeenMarkers;
-use crate::linalg::{mirror_upper, orthonormal, product};
+use crate::linalg::{mirror_upper_rows, orthonormal, product};
 use crate::model::plate_modes::MODES;
 use crate::problem::Step;
 use crate::solve::linear::{Carried, LinearImage, LinearPose, LinearProblem, LinearStop};
@@ -42,7 +42,7 @@ pub struct MarkersEliminated {
 }
 
 impl MarkersEliminated {
-    /// Information with the priors of latents and markers, without those of the dense columns.
+    /// Information with the priors of latents and markers, without those of the dense columns: lower triangle.
     pub fn build(linear: LinearProblem, lambda: f64) -> (DMatrix<f64>, Self) {
         let (layout, seen) = (&linear.adjustment.problem.layout, SeenMarkers::of(linear));
         let mut n = layout.len();
@@ -77,7 +77,7 @@ impl MarkersEliminated {
                     }
                 }
                 let own = stop.information();
-                a.view_mut((start, start), own.shape()).copy_from(&own);
+                a.view_mut((start, start), own.shape()).copy_from(&own.transpose());
             }
         }
         let damped = |mut v: Matrix3<f64>| {
@@ -94,8 +94,8 @@ impl MarkersEliminated {
             }
         };
         y.times_right(&inverse_factors.iter().map(Matrix3::transpose).collect::<Vec<_>>());
-        mirror_upper(&mut a);
-        a -= space.congruent(&y.gram());
+        mirror_upper_rows(&mut a, layout.len());
+        space.take_congruent(&y.gram(), &mut a);
         let rhs = DVector::zeros(3 * seen.order.len());
         let (held, taken) = (DMatrix::zeros(rhs.len(), 0), DMatrix::zeros(space.rows(), 0));
         (a, Self { seen, latent_start, inverse_factors, space, y, held, taken, rhs })

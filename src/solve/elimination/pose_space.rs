@@ -5,9 +5,10 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, Vector6};
+use nalgebra::{DMatrix, DVectorView, Vector6};
+use rayon::prelude::*;
 
-use crate::linalg::{add_combination, columns_product, product, transposed_product_with, wide};
+use crate::linalg::{COLUMNS_A_BLOCK, add_combination, columns_product, product, transposed_product_with, wide};
 use crate::problem::Layout;
 use crate::solve::linear::LinearProblem;
 
@@ -97,13 +98,23 @@ impl PoseSpace {
     fn without_columns(&self, y: &DMatrix<f64>) -> DMatrix<f64> {
         let mut all = DMatrix::zeros(self.unknowns, y.ncols());
         for (mut into, y) in all.column_iter_mut().zip(y.column_iter()) {
-            into.rows_range_mut(self.direct.clone()).copy_from(&y.rows_range(self.poses()..));
-            for (k, latents) in self.by_latents.iter().enumerate() {
+            self.add_without_columns(y, into.as_mut_slice(), 0);
+        }
+        all
+    }
+
+    /// Adds to a column of `T' y` from `first` on what is latent and the columns that act directly have in it.
+    fn add_without_columns(&self, y: DVectorView<f64>, into: &mut [f64], first: usize) {
+        if first < self.direct.end {
+            let direct = into[self.direct.clone()].iter_mut().zip(&y.as_slice()[self.poses()..]);
+            direct.for_each(|(into, y)| *into += y);
+        }
+        for (k, latents) in self.by_latents.iter().enumerate() {
+            if latents.last().is_some_and(|(last, _)| *last >= first) {
                 let pose = y.fixed_rows::<6>(6 * k);
                 latents.iter().for_each(|(place, l)| into[*place] += l.dot(&pose));
             }
         }
-        all
     }
 
     /// Adds to the first columns of `T' y` what those that move poses have in it.
@@ -115,16 +126,22 @@ impl PoseSpace {
         }
     }
 
-    /// `T' m T` of a symmetric matrix.
-    pub fn congruent(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
-        let dense = self.direct.end;
+    /// `a -= T' m T` with a symmetric matrix `m`, in the lower triangle of `a`.
+    pub fn take_congruent(&self, m: &DMatrix<f64>, a: &mut DMatrix<f64>) {
         let half = self.times_space(m);
-        let mut all = self.without_columns(&half);
-        self.add_columns_of(&half, &mut all, dense);
-        for latent in dense..self.unknowns {
-            (0..dense).for_each(|row| all[(row, latent)] = all[(latent, row)]);
-        }
-        all
+        let of_columns = transposed_product_with(&self.by_columns, &half, 0..self.poses(), 0..self.direct.end);
+        let rows = self.unknowns.max(1);
+        a.as_mut_slice().par_chunks_mut(COLUMNS_A_BLOCK * rows).enumerate().for_each(|(block, columns)| {
+            let mut own = vec![0.0; rows];
+            for (c, column) in (block * COLUMNS_A_BLOCK..).zip(columns.chunks_exact_mut(rows)) {
+                own[c..].fill(0.0);
+                self.add_without_columns(half.column(c), &mut own, c);
+                if c < self.direct.end {
+                    self.columns.iter().zip(of_columns.column(c).iter()).for_each(|(&row, sum)| own[row] += sum);
+                }
+                column[c..].iter_mut().zip(&own[c..]).for_each(|(a, own)| *a -= own);
+            }
+        });
     }
 
     /// `T c T'` of a symmetric matrix.
