@@ -137,6 +137,7 @@ pub fn main() -> ExitCode {
         stages::tell();
     }
     start_log(cli.verbose);
+    memory::keep_freed();
     memory::set_threads(cli.threads);
     let Some(command) = cli.command else {
         say::say_line!("{}", examples::START);
