@@ -16,6 +16,9 @@ use crate::model::camera::Lens;
 use crate::problem::{Adjustment, Equations, PlateShape, Step};
 use crate::solve::{LinearImage, Response, Singular, in_frame};
 
+/// Highest degree of a polynomial.
+const HIGHEST: usize = 5;
+
 /// Share of the information of a scaled direction below which the fit absorbs it.
 const ABSORBED: f64 = 1e-8;
 /// Columns that everything else absorbs are left out below this share of what they say.
@@ -23,7 +26,7 @@ const LEAST_SHARE: f64 = 1e-9;
 /// One-sided normal deviate of a power of 95 %.
 const POWER_95: f64 = 1.645;
 /// Degrees of the displacement field, of the bow and of the print of the plate.
-const FIELD_DEGREES: [usize; 2] = [2, 5];
+const FIELD_DEGREES: [usize; 2] = [2, HIGHEST];
 const BOW_DEGREES: [usize; 2] = [2, 4];
 const PRINT_DEGREES: [usize; 2] = [2, 3];
 /// Unit of the columns of a plate, m.
@@ -276,18 +279,19 @@ fn columns(fit: &Adjustment, groups: &[Group], own: &LinearImage, equations: &Eq
 /// Displacements in the image, px, at `y` (1 at the corner) from the axis, at `across` (-1 to 1) of the image.
 fn image_shifts(pattern: Pattern, y: &Vector2<f64>, across: &Vector2<f64>, depth_m: f64) -> Vec<Vector2<f64>> {
     let t2 = y.norm_squared();
+    let mut shifts = Vec::with_capacity(pattern.columns());
     match pattern {
         Pattern::ThinPrism => {
-            [(t2, 0.0), (t2 * t2, 0.0), (0.0, t2), (0.0, t2 * t2)].map(|(u, v)| Vector2::new(u, v)).to_vec()
+            shifts.extend([(t2, 0.0), (t2 * t2, 0.0), (0.0, t2), (0.0, t2 * t2)].map(|(u, v)| Vector2::new(u, v)));
         }
-        Pattern::Radial => vec![y * t2.powi(4), y * t2.powi(5)],
-        Pattern::Parallax => vec![y * (t2 / depth_m), y * (t2 * t2 / depth_m)],
-        Pattern::Field => polynomials(across, FIELD_DEGREES)
-            .into_iter()
-            .flat_map(|b| [Vector2::new(b, 0.0), Vector2::new(0.0, b)])
-            .collect(),
-        Pattern::PlateBow | Pattern::PlatePrint | Pattern::Tolerance => Vec::new(),
+        Pattern::Radial => shifts.extend([y * t2.powi(4), y * t2.powi(5)]),
+        Pattern::Parallax => shifts.extend([y * (t2 / depth_m), y * (t2 * t2 / depth_m)]),
+        Pattern::Field => each_polynomial(across, FIELD_DEGREES, |b| {
+            shifts.extend([Vector2::new(b, 0.0), Vector2::new(0.0, b)]);
+        }),
+        Pattern::PlateBow | Pattern::PlatePrint | Pattern::Tolerance => {}
     }
+    shifts
 }
 
 /// Place of a marker, 1 at the farthest.
@@ -297,30 +301,32 @@ fn on_plate(plate: &PlateShape, marker: usize) -> Vector2<f64> {
 
 /// Displacements of a marker, m.
 fn plate_shifts(pattern: Pattern, at: &Vector2<f64>) -> Vec<Vector3<f64>> {
+    let mut shifts = Vec::with_capacity(pattern.columns());
     match pattern {
         Pattern::PlateBow => {
-            polynomials(at, BOW_DEGREES).into_iter().map(|b| Vector3::new(0.0, 0.0, b * PLATE_UNIT_M)).collect()
+            each_polynomial(at, BOW_DEGREES, |b| shifts.push(Vector3::new(0.0, 0.0, b * PLATE_UNIT_M)));
         }
-        Pattern::PlatePrint => polynomials(at, PRINT_DEGREES)
-            .into_iter()
-            .flat_map(|b| [Vector3::new(b * PLATE_UNIT_M, 0.0, 0.0), Vector3::new(0.0, b * PLATE_UNIT_M, 0.0)])
-            .collect(),
-        _ => Vec::new(),
+        Pattern::PlatePrint => each_polynomial(at, PRINT_DEGREES, |b| {
+            shifts.extend([Vector3::new(b * PLATE_UNIT_M, 0.0, 0.0), Vector3::new(0.0, b * PLATE_UNIT_M, 0.0)]);
+        }),
+        _ => {}
     }
+    shifts
 }
 
 /// Products of Legendre polynomials of a range of degrees.
-fn polynomials(at: &Vector2<f64>, [low, high]: [usize; 2]) -> Vec<f64> {
+fn each_polynomial(at: &Vector2<f64>, [low, high]: [usize; 2], mut tell: impl FnMut(f64)) {
     let legendre = |x: f64| {
-        let mut p = vec![1.0, x];
+        let mut p = [1.0; HIGHEST + 1];
+        p[1] = x;
         for k in 1..high {
             let n = k as f64;
-            p.push(((2.0 * n + 1.0) * x * p[k] - n * p[k - 1]) / (n + 1.0));
+            p[k + 1] = ((2.0 * n + 1.0) * x * p[k] - n * p[k - 1]) / (n + 1.0);
         }
         p
     };
     let (x, y) = (legendre(at.x), legendre(at.y));
-    (low..=high).flat_map(|d| (0..=d).map(move |i| (i, d - i))).map(|(i, k)| x[i] * y[k]).collect()
+    (low..=high).for_each(|d| (0..=d).for_each(|i| tell(x[i] * y[d - i])));
 }
 
 /// What a group of columns takes.
