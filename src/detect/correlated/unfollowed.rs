@@ -31,9 +31,9 @@ impl Seen {
     }
 
     /// True only where [`Self::unfollowed`] of white noise, shrunk, is white noise: what no noise explains of the squares is no less than nothing.
-    pub fn is_white<'a>(&self, parts: impl Iterator<Item = &'a OddPart>) -> bool {
+    pub fn is_white<'a>(&self, mut parts: impl Iterator<Item = &'a OddPart>) -> bool {
         let mut of_windows = Sums::NOTHING;
-        let is_known = parts.fold(true, |is_known, part| is_known && of_windows.add_white(part).is_some());
+        let is_known = parts.all(|part| of_windows.add_white(part).is_some());
         let mut squares = 0.0;
         self.compare(&of_windows, |row, (weight, count), products| {
             squares += weight * (products - count * row[0]).powi(2) / count;
