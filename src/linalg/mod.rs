@@ -248,7 +248,7 @@ pub fn mirror_upper_rows(a: &mut DMatrix<f64>, rows: usize) {
 }
 
 /// Copies the lower triangle to the upper one.
-pub fn mirror_lower(a: &mut DMatrix<f64>) {
+fn mirror_lower(a: &mut DMatrix<f64>) {
     let rows = a.nrows();
     each_pair(a, rows, |values, above, below| values[above] = values[below]);
 }

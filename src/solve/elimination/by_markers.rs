@@ -42,7 +42,7 @@ pub struct MarkersEliminated {
 }
 
 impl MarkersEliminated {
-    /// Information with the priors of latents and markers, without those of the dense columns: lower triangle.
+    /// Information with the priors of latents and markers, without those of the dense columns.
     pub fn build(linear: LinearProblem, lambda: f64) -> (DMatrix<f64>, Self) {
         let (layout, seen) = (&linear.adjustment.problem.layout, SeenMarkers::of(linear));
         let mut n = layout.len();
@@ -76,8 +76,9 @@ impl MarkersEliminated {
                         column += own;
                     }
                 }
-                let own = stop.information();
-                a.view_mut((start, start), own.shape()).copy_from(&own.transpose());
+                let mut own = stop.information();
+                own.fill_lower_triangle_with_upper_triangle();
+                a.view_mut((start, start), own.shape()).copy_from(&own);
             }
         }
         let damped = |mut v: Matrix3<f64>| {

@@ -98,22 +98,18 @@ impl PoseSpace {
     fn without_columns(&self, y: &DMatrix<f64>) -> DMatrix<f64> {
         let mut all = DMatrix::zeros(self.unknowns, y.ncols());
         for (mut into, y) in all.column_iter_mut().zip(y.column_iter()) {
-            self.add_without_columns(y, into.as_mut_slice(), 0);
+            self.add_without_columns(y, into.as_mut_slice());
         }
         all
     }
 
-    /// Adds to a column of `T' y` from `first` on what is latent and the columns that act directly have in it.
-    fn add_without_columns(&self, y: DVectorView<f64>, into: &mut [f64], first: usize) {
-        if first < self.direct.end {
-            let direct = into[self.direct.clone()].iter_mut().zip(&y.as_slice()[self.poses()..]);
-            direct.for_each(|(into, y)| *into += y);
-        }
+    /// Adds to a column of `T' y` what is latent and the columns that act directly have in it.
+    fn add_without_columns(&self, y: DVectorView<f64>, into: &mut [f64]) {
+        let direct = into[self.direct.clone()].iter_mut().zip(&y.as_slice()[self.poses()..]);
+        direct.for_each(|(into, y)| *into += y);
         for (k, latents) in self.by_latents.iter().enumerate() {
-            if latents.last().is_some_and(|(last, _)| *last >= first) {
-                let pose = y.fixed_rows::<6>(6 * k);
-                latents.iter().for_each(|(place, l)| into[*place] += l.dot(&pose));
-            }
+            let pose = y.fixed_rows::<6>(6 * k);
+            latents.iter().for_each(|(place, l)| into[*place] += l.dot(&pose));
         }
     }
 
@@ -126,22 +122,25 @@ impl PoseSpace {
         }
     }
 
-    /// `a -= T' m T` with a symmetric matrix `m`, in the lower triangle of `a`.
+    /// `a -= T' m T` of symmetric matrices.
     pub fn take_congruent(&self, m: &DMatrix<f64>, a: &mut DMatrix<f64>) {
-        let half = self.times_space(m);
-        let of_columns = transposed_product_with(&self.by_columns, &half, 0..self.poses(), 0..self.direct.end);
+        let (half, dense) = (self.times_space(m), self.direct.end);
+        let of_columns = transposed_product_with(&self.by_columns, &half, 0..self.poses(), 0..dense);
         let rows = self.unknowns.max(1);
         a.as_mut_slice().par_chunks_mut(COLUMNS_A_BLOCK * rows).enumerate().for_each(|(block, columns)| {
             let mut own = vec![0.0; rows];
             for (c, column) in (block * COLUMNS_A_BLOCK..).zip(columns.chunks_exact_mut(rows)) {
-                own[c..].fill(0.0);
-                self.add_without_columns(half.column(c), &mut own, c);
-                if c < self.direct.end {
+                own.fill(0.0);
+                self.add_without_columns(half.column(c), &mut own);
+                if c < dense {
                     self.columns.iter().zip(of_columns.column(c).iter()).for_each(|(&row, sum)| own[row] += sum);
                 }
-                column[c..].iter_mut().zip(&own[c..]).for_each(|(a, own)| *a -= own);
+                column.iter_mut().zip(&own).for_each(|(a, own)| *a -= own);
             }
         });
+        for latent in dense..self.unknowns {
+            (0..dense).for_each(|row| a[(row, latent)] = a[(latent, row)]);
+        }
     }
 
     /// `T c T'` of a symmetric matrix.

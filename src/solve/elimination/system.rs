@@ -45,7 +45,7 @@ pub enum Eliminated {
 /// Reduced normal equations; unknowns in the order dense columns, then the family that stays.
 #[derive(Debug, Clone)]
 pub struct System {
-    /// Information matrix, lower triangle: what lies above is read nowhere.
+    /// Information matrix, symmetric.
     pub information: DMatrix<f64>,
     /// Right-hand side.
     pub rhs: DVector<f64>,

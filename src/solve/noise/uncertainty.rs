@@ -48,7 +48,7 @@ impl NoiseUncertainty {
         let scaled = |m: &DMatrix<f64>, power: i32| {
             DMatrix::from_fn(n, n, |i, k| {
                 let (a, b) = (latents[i], latents[k]);
-                m[(a.row.max(b.row), a.row.min(b.row))] * (a.sigma * b.sigma).powi(power)
+                m[(a.row, b.row)] * (a.sigma * b.sigma).powi(power)
             })
         };
         let at_known = SymmetricFactor::new(&scaled(&cov.system.information, 1)).ok()?.inverse();

@@ -14,7 +14,6 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 use super::covariance::{Covariance, put_first};
 use super::frame::{Frame, frames};
 use crate::error::{Code, Error, Result};
-use crate::linalg::mirror_lower;
 use crate::model::plate_modes::MODES;
 use crate::problem::{Adjustment, Problem, SCALE};
 use crate::solve::elimination::seen_markers::SeenMarkers;
@@ -149,7 +148,6 @@ fn hold(system: &mut System, combinations: DMatrix<f64>, following: &[Following]
         Eliminated::Markers(e) => {
             let taken = e.hold(&combinations);
             system.information += &taken * taken.transpose();
-            mirror_lower(&mut system.information);
             None
         }
         Eliminated::Stops(e) => Some(e.hold(combinations, &mut system.information)),
