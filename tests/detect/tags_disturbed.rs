@@ -85,7 +85,7 @@ impl Scene {
     }
 
     /// Moves the plate so that the outermost corner of a tag lies so far within a border of the picture.
-    fn to_border(&mut self, rng: &mut ChaCha8Rng, within_px: f64) {
+    fn cut_by_border(&mut self, rng: &mut ChaCha8Rng, within_px: f64) {
         let [width, height] = SIZE.map(|n| f64::from(n) - 1.0);
         let tag = self.plate.markers[4 * rng.random_range(0..self.plate.markers.len() / 4)].id / 4;
         let border = rng.random_range(0..4_usize);
@@ -216,7 +216,7 @@ fn at_border(board: (&str, f64, &str), seeds: std::ops::Range<u64>, power: f64) 
         let mut scene = scene_of(board, &view(board.1, &mut rng));
 
         let within_px = if is_grid(board.1) { rng.random_range(-5.0..5.0) } else { rng.random_range(-1.0..6.0) };
-        scene.to_border(&mut rng, within_px);
+        scene.cut_by_border(&mut rng, within_px);
         let inside = |id: u32| scene.corner(id).map_or(-1e9, |p| scene.within(&p));
         let asked = |id: u32| usize::from(inside(id) > 0.0);
         let away = |id: u32| usize::from(corners_of(id).all(|k| inside(k) > 8.0));
