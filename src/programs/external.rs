@@ -48,7 +48,7 @@ impl PutAnywhere {
         self.places.push((axis, place));
     }
 
-    /// A text may put any of them anywhere.
+    /// A text may put any of them anywhere: it moves such axes alone, to where none tells.
     pub fn note_all(&mut self) {
         self.places.extend((0..EXTERNAL_AXES).map(|axis| (axis, None)));
     }

@@ -220,6 +220,67 @@ fn poses_that_leave_out_an_external_axis_are_left_where_it_may_stand_elsewhere_t
     }
 }
 
+/// What moves external axes to where no file tells may have put any of them anywhere, until a target tells all of them.
+#[test]
+fn poses_that_leave_out_an_external_axis_are_left_behind_one_that_is_moved_to_where_no_text_tells() {
+    let cell = Cell::kuka(68);
+    let q: Vec<f64> = START.iter().map(|q| q.to_radians()).collect();
+    let (pose, axes) = (krl(&cell, &q), START.map(|q| format!("{q:.1}")));
+    let angles: Vec<String> = axes.iter().enumerate().map(|(k, v)| format!("A{} {v}", k + 1)).collect();
+    let home = format!("PTP {{E6AXIS: {},E1 0,E2 0,E3 0,E4 0,E5 0,E6 0}}\n", angles.join(","));
+    let there = format!("PTP {pose}\n");
+    let external = LeftReason::ExternalAxis.name().to_owned();
+    let start = format!("--start={}", axes.join(","));
+    for (body, parked, corrected, left) in [
+        (format!("ASYPTP XPARK\n{there}"), None, 0, 1),
+        (format!("ASYPTP XPARK\n{home}{there}"), None, 2, 0),
+        (format!("IF $IN[1] THEN\nASYPTP XPARK\nENDIF\n{there}"), None, 0, 1),
+        (format!("ASYPTP XPARK\n{there}"), Some("{E1 0}"), 1, 0),
+        (format!("ASYPTP XPARK\n{there}"), Some("{E1 90}"), 0, 1),
+        (format!("ASYPTP {{E1 0}}\n{there}"), None, 1, 0),
+        (format!("PTP XPARK\n{there}"), None, 1, 0),
+        // What ends such a motion moves none that the files put nowhere.
+        (format!("ASYSTOP\nASYCANCEL 1\n{there}"), None, 1, 0),
+    ] {
+        let src = format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{body}END\n");
+        let dat = parked.map(|at| ("a.dat", format!("DEFDAT a\nDECL E6AXIS XPARK={at}\nENDDAT\n")));
+        let files: Vec<(&str, String)> = std::iter::once(("a.src", src)).chain(dat).collect();
+        let found = told(&cell, &files, &[&start]);
+        let unknown = found.1.iter().filter(|reason| **reason == external).count();
+        assert_eq!((found.0, unknown), (corrected, left), "{body} {parked:?}: {found:?}");
+    }
+    let target = robtarget(&cell.nominal.base_from_tip(&q), UNCHECKED);
+    let at = |e: &str| format!("MoveAbsJ [[{}],[{e}]],v10,fine,tool0;\n", axes.join(","));
+    let (one, all) = (at("0,9E9,9E9,9E9,9E9,9E9"), at("0,0,0,0,0,0"));
+    let there = format!("MoveJ {target},v10,fine,tool0;\n");
+    let data = |e: &str| {
+        let none = "9E9,9E9,9E9,9E9,9E9";
+        format!("ENDPROC\nCONST jointtarget jExt:=[[{none},9E9],[{e},{none}]];\nPROC q()\n")
+    };
+    for (body, corrected, left) in [
+        (format!("MoveExtJ jExt,vrot10,fine;\n{there}"), 0, 1),
+        (format!("MoveExtJ \\Conc,jExt,vrot10,fine;\n{there}"), 0, 1),
+        (format!("IF a=1 MoveExtJ jExt,vrot10,fine;\n{there}"), 0, 1),
+        (format!("MoveExtJ jExt,vrot10,fine;\n{one}{there}"), 1, 1),
+        (format!("MoveExtJ jExt,vrot10,fine;\n{all}{there}"), 2, 0),
+        (format!("MoveExtJ jExt,vrot10,fine;\n{there}{}", data("0")), 1, 0),
+        (format!("MoveExtJ jExt,vrot10,fine;\n{there}{}", data("90")), 0, 1),
+        // It stops where its signal comes, if not there.
+        (format!("SearchExtJ di1,jFound,jExt,vrot10;\n{there}"), 0, 1),
+        (format!("SearchExtJ di1,jFound,jExt,vrot10;\n{all}{there}"), 2, 0),
+        (format!("SearchExtJ di1,jFound,jExt,vrot10;\n{there}{}", data("0")), 0, 1),
+        (format!("MoveAbsJ jHome,v10,fine,tool0;\n{there}"), 1, 0),
+        (format!("rPick;\n{there}"), 1, 0),
+        (format!("MoveExtJ jExt,vrot10,fine;\n{there}ENDPROC\nPROC MoveExtJ(jointtarget j)\n"), 1, 0),
+    ] {
+        let text = format!("MODULE m\nPROC main()\nConfJ\\Off;\n{body}ENDPROC\nENDMODULE\n");
+        let found = told(&cell, &[("m.mod", text.clone())], &[&start]);
+        let unknown = found.1.iter().filter(|reason| **reason == external).count();
+        assert_eq!((found.0, unknown), (corrected, left), "{body}: {found:?}");
+        assert_eq!(told(&cell, &[("m.mod", text)], &[&start, "--axes-apart"]).0, corrected + left, "{body}");
+    }
+}
+
 /// Such data (`CONST extjoint pExt:=[500,..]`) may put an axis elsewhere.
 #[test]
 fn external_axes_of_rapid_that_a_target_has_by_name_may_stand_elsewhere_than_at_zero() {

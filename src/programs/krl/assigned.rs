@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::aggregate::index;
 use super::reads::reads;
-use crate::programs::references::References;
+use crate::programs::references::{References, variable};
 use crate::programs::scan::Reader;
 
 /// Beginnings and ends of branches and loops.
@@ -80,6 +80,11 @@ impl Assigned {
             }
             reader.skip_line();
         }
+    }
+
+    /// True for a name to which the files give something, be it to an element or a component.
+    pub fn sets(&self, name: &str) -> bool {
+        self.times.keys().any(|set| variable(set) == name)
     }
 
     /// What an interrupt or a trigger sets, `DO NAME=..`, whenever that is.

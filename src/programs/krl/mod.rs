@@ -132,6 +132,11 @@ fn reading(
             calls::look_through(&mut references, reader(index, file)?);
         }
     }
+    // It is taken that it moves external axes of the description, where that has any.
+    let lacks_all = setting.external_axes() == 0;
+    for (index, file) in files.iter().enumerate().filter(|(_, file)| lacks_all && has_moves(file)) {
+        off_zero::goes_beside(&mut module.put_anywhere, reader(index, file)?, |name| module.assigned.sets(name));
+    }
     module.off_zero_anywhere = module.put_anywhere.off_zero();
     module.assigned.changed_by_calls(&references);
     // Data first: programs use them in whatever order the files are given.

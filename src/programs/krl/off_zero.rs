@@ -9,6 +9,21 @@ use crate::programs::scan::{Reader, TokenKind};
 pub(super) const BESIDE: [&str; 6] =
     ["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL", "$ASYNC_AXIS", "$ASYNC_EX_AX_DECOUPLE"];
 
+/// Those of them that go to a position.
+const GO_BESIDE: [&str; 2] = ["ASYPTP", "ASYCONT"];
+
+/// Notes that a text moves external axes beside the program to where none of the files tells: they may stand anywhere. `is_told` for names that are set.
+pub(super) fn goes_beside(all: &mut PutAnywhere, mut reader: Reader<'_>, is_told: impl Fn(&str) -> bool) {
+    while !reader.done() {
+        let goes = GO_BESIDE.iter().any(|word| reader.ahead_is_word(0, word));
+        let is_named = reader.name_of(reader.at + 1).is_some_and(|name| is_told(&name));
+        if goes && !is_named && !reader.ahead_is_mark(1, b'{') {
+            all.note_all();
+        }
+        reader.skip_line();
+    }
+}
+
 /// Notes the external axes that a text puts somewhere.
 pub(super) fn look_through(all: &mut PutAnywhere, mut reader: Reader<'_>) {
     let mut open = Vec::new();

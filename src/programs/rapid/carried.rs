@@ -2,10 +2,12 @@
 
 use std::ops::Range;
 
-use super::Task;
+use super::moves::{external_target_of, writes_found};
 use super::off_zero::places;
+use super::statements::arguments;
 use super::still::is_still;
-use super::value::{Node, external_name, is_set};
+use super::value::{Node, array_of, external_name, is_set};
+use super::{Datum, Task};
 use crate::programs::external::NO_AXIS;
 use crate::programs::flow::Either;
 use crate::programs::program::Understood;
@@ -39,6 +41,44 @@ impl Task<'_> {
             _ => return None,
         };
         places(&target)
+    }
+
+    /// Notes what a text moves beside the arm: to where none of the files tells, external axes that the description lacks may stand anywhere. It is taken
+    /// that it moves those of the description, where that has any.
+    pub(super) fn moves_external_axes(&mut self, mut reader: Reader<'_>) {
+        self.switching.file_begins(reader.index);
+        while !reader.done() {
+            let (word, line) = (reader.name().filter(|word| !self.switching.has_routine(word)), reader.line());
+            reader.at += 1;
+            let Some((word, targets)) = word.and_then(|word| external_target_of(&word).map(|targets| (word, targets)))
+            else {
+                continue;
+            };
+            let start = reader.at;
+            let read = arguments(&mut reader, (&word, line)).ok();
+            reader.at = start;
+            let target = read.and_then(|read| read.plain.into_iter().nth(targets.skipped));
+            let places = target.filter(|target| target.is_whole).and_then(|target| self.written_places(&target.value));
+            let all = &mut self.switching.put_anywhere;
+            match places {
+                None if self.setting.external_axes() == 0 => all.note_all(),
+                None => {}
+                // It stops anywhere on the way.
+                Some(places) if writes_found(&word) => places.iter().for_each(|(axis, _)| all.note(*axis, None)),
+                // They are noted where the target stands.
+                Some(_) => {}
+            }
+        }
+    }
+
+    /// Where the text of a target puts external axes, whatever changes it later, by their number from 0; of an array, where its elements do.
+    fn written_places(&self, value: &Node) -> Option<Vec<(usize, Option<f64>)>> {
+        let Node::Word(name) = value else { return places(value) };
+        let of = |datum: &Datum| places(datum.value.as_ref().or(datum.before.as_ref())?);
+        let Some(array) = name.strip_suffix("{}") else { return of(self.data.get(self.meant(name))?) };
+        let elements = self.data.iter().filter(|(key, _)| array_of(key) == Some(array));
+        let all = elements.map(|(_, datum)| of(datum)).collect::<Option<Vec<_>>>()?;
+        (!all.is_empty()).then(|| all.concat())
     }
 
     /// Behind the point on a circle: its external axes are not heeded (ABB, *Technical reference manual RAPID Instructions, Functions and Data types*,

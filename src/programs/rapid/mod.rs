@@ -106,6 +106,7 @@ fn reading(
     }
     for file in files.iter().enumerate() {
         task.assignments(reader(file)?);
+        task.moves_external_axes(reader(file)?);
         Task::look_for_calls(&mut references, reader(file)?);
         task.switching.look_through(reader(file)?);
     }

@@ -26,6 +26,10 @@ const TWO: Targets = Targets { skipped: 0, count: 2 };
 /// Behind a signal and the point that is found.
 const BEHIND_FOUND: usize = 2;
 
+/// Instructions that move external axes alone.
+const OF_EXTERNAL_AXES: [(&str, Targets); 2] =
+    [("MOVEEXTJ", ONE), ("SEARCHEXTJ", Targets { skipped: BEHIND_FOUND, ..ONE })];
+
 const MOVES: [(&str, Targets); 50] = [
     ("MOVEABSJ", ONE),
     ("MOVEJ", ONE),
@@ -84,6 +88,11 @@ pub(super) fn targets_of(name: &str) -> Option<Targets> {
     MOVES.iter().find(|(known, _)| *known == name).map(|(_, targets)| *targets)
 }
 
+/// Where the target of an instruction that moves external axes alone stands.
+pub(super) fn external_target_of(name: &str) -> Option<Targets> {
+    OF_EXTERNAL_AXES.iter().find(|(known, _)| *known == name).map(|(_, targets)| *targets)
+}
+
 /// True for a move to axis angles.
 pub(super) fn is_to_joints(name: &str) -> bool {
     name.ends_with("ABSJ")
@@ -94,7 +103,7 @@ pub(super) fn is_of_joints(name: &str) -> bool {
     name.ends_with('J') || ["MOVEJ", "TRIGGJ"].iter().any(|kind| name.starts_with(kind))
 }
 
-/// True for an instruction that writes the point which it finds: its second argument.
+/// True for an instruction that writes the point which it finds, where it stops: its second argument.
 pub(super) fn writes_found(name: &str) -> bool {
     ["SEARCHL", "SEARCHC", "SEARCHEXTJ"].contains(&name)
 }

@@ -150,24 +150,24 @@ fn has_arguments(reader: &Reader<'_>) -> bool {
 
 /// Arguments of an instruction.
 #[derive(Default)]
-struct Arguments {
+pub(super) struct Arguments {
     /// Those that stand between commas.
-    plain: Vec<Argument>,
+    pub plain: Vec<Argument>,
     /// The work object, behind its switch.
     work: Option<Node>,
     switches: MoveSwitches,
 }
 
 /// One that stands between commas.
-struct Argument {
+pub(super) struct Argument {
     /// Its first operand.
-    value: Node,
+    pub value: Node,
     /// False where more follows, so that it is an expression.
-    is_whole: bool,
+    pub is_whole: bool,
 }
 
 /// Reads the arguments of an instruction of this name and line, up to its semicolon.
-fn arguments(reader: &mut Reader<'_>, (name, line): (&str, usize)) -> Result<Arguments> {
+pub(super) fn arguments(reader: &mut Reader<'_>, (name, line): (&str, usize)) -> Result<Arguments> {
     let mut read = Arguments::default();
     loop {
         reader.skip_line_ends();
