@@ -40,6 +40,7 @@ mod reading_ratio;
 mod repeated_measurements;
 mod rounded_readings;
 mod scatter;
+mod slopes;
 mod small_gain;
 mod stands_still;
 mod stated_noise;
