@@ -1,18 +1,18 @@
 //! Whether a plate has the size that its file states. The lengths of the robot's links are the only others there are; of poses without a robot, the
 //! positions of the controller.
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use super::rail::{OR_THE_RAIL, is_on_rail, with_gears_released};
+use super::slopes::slopes;
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
-use crate::problem::{Adjustment, Problem, SCALE, State, UNKNOWN_SCALE, seen_markers, size_by_distance};
+use crate::model::plate_modes::{ASPECT, DOT_GAIN, MODES};
+use crate::problem::{Adjustment, PlateShape, Problem, SCALE, State, UNKNOWN_SCALE, seen_markers, size_by_distance};
 use crate::series::Plate;
 use crate::solve::{ComponentOptions, Status, System, estimate_components};
-
-const ASPECT: usize = 1;
 
 /// Stops that tell of the size: what more of them leave open is small beside what the links do.
 const MOST_STOPS: usize = 2000;
@@ -83,11 +83,13 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     for (k, plate) in problem.plates.iter().enumerate() {
         let released = ReleasedSize::of(some.as_ref().unwrap_or(&fit.adjustment), k);
         let beyond = |told: &Told, sigmas: f64| told.off.abs() > sigmas * told.sigma;
-        // A size that is stated wrongly makes the links look worse than they are, and what they say less certain.
-        let suspected = released.one_step().filter(|told| beyond(told, limits.plate_size_suspected));
-        let told = suspected.and_then(|_| released.fitted()).filter(|told| told.sigma < limits.plate_size_told);
+        // A size that is stated wrongly makes the links look worse than they are, and what they say less certain; a stretched plate as well.
+        let is_suspected = || released.one_step().is_some_and(|told| beyond(&told, limits.plate_size_suspected));
+        let uneven = uneven(&fit.adjustment, k, limits);
+        let fitted = if uneven.is_some() || is_suspected() { released.fitted() } else { None };
+        let fitted = fitted.filter(|(told, _)| told.sigma < limits.plate_size_told);
         let measured = plate.scale.is_some();
-        if let Some(told) = told
+        if let Some((told, _)) = fitted
             && let Some(weight) = match told {
                 told if beyond(&told, limits.plate_size_sigmas) => Some(Weight::Gate),
                 told if !measured && beyond(&told, limits.plate_size_doubtful) => Some(Weight::Note),
@@ -96,10 +98,10 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
         {
             doubts.push(DoubtedSize::Contradicted { measured, off: told.off, sigma: told.sigma, weight, told_by });
         }
-        if let Some((off, tolerance)) = uneven(&fit.adjustment, k, limits) {
-            let along = told.or_else(|| released.fitted()).map(|told| {
-                let sigma = told.sigma.hypot(0.5 * tolerance);
-                [0.5 * off, -0.5 * off].map(|half| (told.off + half, sigma))
+        if let Some((off, tolerance)) = uneven {
+            let along = fitted.and_then(|(told, axes)| {
+                let (axes, by_markers) = (axes?, stretch(&fit.adjustment, k)?);
+                Some([0, 1].map(|axis| (axes[axis], told.sigma.hypot(by_markers[axis].1))))
             });
             doubts.push(DoubtedSize::Uneven { off, tolerance, along, told_by });
         }
@@ -114,8 +116,8 @@ pub fn uneven_plates(adjustment: &Adjustment, limits: &Limits) -> Vec<DoubtedSiz
 }
 
 /// The x/y scale of a plate whose size was not measured and its prior sigma, where it is far beyond that.
-fn uneven(Adjustment { problem, state }: &Adjustment, plate: usize, limits: &Limits) -> Option<(f64, f64)> {
-    let told = x_y_scale(problem, state, plate).filter(|_| problem.plates[plate].scale.is_none());
+fn uneven(adjustment: &Adjustment, plate: usize, limits: &Limits) -> Option<(f64, f64)> {
+    let told = x_y_scale(adjustment, plate).filter(|_| adjustment.problem.plates[plate].scale.is_none());
     told.filter(|(off, tolerance)| off.abs() > limits.plate_aspect_sigmas * tolerance)
 }
 
@@ -233,11 +235,17 @@ fn release(adjustment: &mut Adjustment, index: usize) {
     adjustment.problem.layout.columns[at].prior_sigma = UNKNOWN_SCALE;
     let released = &mut adjustment.problem.plates[index];
     released.scale = None;
-    // The markers keep the places that were found: as corrections with a tolerance in metres they would ask for a plate of no size.
+    // The markers keep the shape that was found, and grow with the plate: corrections with a tolerance in metres, and modes beside the stated size, would
+    // ask for a plate of no size.
     released.markers.iter_mut().for_each(|m| m.sigma_m = 0.0);
+    let start = adjustment.problem.layout.shapes[index].start;
     let shape = &mut adjustment.state.plates[index];
-    for (nominal, correction) in shape.nominal.iter_mut().zip(&mut shape.corrections) {
-        *nominal += std::mem::take(correction);
+    let grown = 1.0 + shape.modes[SCALE];
+    shape.nominal = (0..shape.nominal.len()).map(|m| shape.position(m) / grown).collect();
+    shape.corrections.fill(Vector3::zeros());
+    for mode in (0..MODES).filter(|mode| ![SCALE, DOT_GAIN].contains(mode)) {
+        shape.modes[mode] = 0.0;
+        adjustment.problem.layout.columns[start + mode].prior_mean = 0.0;
     }
 }
 
@@ -280,39 +288,74 @@ impl<'a> ReleasedSize<'a> {
         self.told(&self.adjustment.state, factor.solve(&system.rhs)[at], variance)
     }
 
-    /// By a fit of its own, sizes of the errors included; `None` where it has no end.
-    fn fitted(&self) -> Option<Told> {
+    /// By a fit of its own, sizes of the errors included, and by how much it is longer along x and along y; `None` where it has no end.
+    fn fitted(&self) -> Option<(Told, Option<[f64; 2]>)> {
         let options = ComponentOptions { joint: false, displacement: false, ..ComponentOptions::default() };
         let outcome = estimate_components(self.adjustment.clone(), &options);
         let fit = Some(outcome).filter(|o| o.status == Status::Converged)?.fit().ok()?;
-        self.told(&fit.state, 0.0, fit.covariance.reduced[(self.column(), self.column())])
+        let told = self.told(&fit.state, 0.0, fit.covariance.reduced[(self.column(), self.column())])?;
+        let lacks = told.off - self.off(&fit.state);
+        let along = stretch(&fit.adjustment, self.index).map(|along| along.map(|(off, _)| off + lacks));
+        Some((told, along))
+    }
+
+    /// By how much the plate of a state is larger than stated.
+    fn off(&self, state: &State) -> f64 {
+        let (at, shape) = (self.column(), &state.plates[self.index]);
+        match size_by_distance(self.plate, shape) {
+            Some(size) => 1.0 / size - 1.0,
+            None => {
+                let grown = growth(&self.adjustment.problem, shape, self.index).unwrap_or(shape.modes[SCALE]);
+                grown - self.adjustment.problem.layout.columns[at].prior_mean
+            }
+        }
     }
 
     /// From a state, a step of the scale that it lacks, and the variance of the scale with next to nothing known of it beforehand.
     fn told(&self, state: &State, step: f64, variance: f64) -> Option<Told> {
         let column = &self.adjustment.problem.layout.columns[self.column()];
         let share = 1.0 - variance * UNKNOWN_SCALE.powi(-2);
-        let shape = &state.plates[self.index];
-        let off = match size_by_distance(self.plate, shape) {
-            Some(size) => 1.0 / size - 1.0,
-            None => shape.modes[SCALE] - column.prior_mean,
-        };
-        (column.free && share > 0.0)
-            .then(|| Told { off: (off + step) / share, sigma: (variance / share + self.stated.powi(2)).sqrt() })
+        // The prior of next to nothing holds the scale back by the rest.
+        let mode = state.plates[self.index].modes[SCALE] - column.prior_mean + step;
+        let off = self.off(state) + step + mode * (share.recip() - 1.0);
+        (column.free && share > 0.0).then(|| Told { off, sigma: (variance / share + self.stated.powi(2)).sqrt() })
     }
 }
 
-/// The x/y scale of the markers that were seen, corrections included, and its prior sigma.
-fn x_y_scale(problem: &Problem, state: &State, plate: usize) -> Option<(f64, f64)> {
-    let shape = &state.plates[plate];
-    let (mut along, mut size, mut loose) = (0.0, 0.0, 0.0);
-    for m in seen_markers(problem, plate) {
-        let modes = shape.modes_at(m);
-        let stretch = modes.column(ASPECT);
-        along += stretch.dot(&(shape.position(m) - shape.nominal[m]));
-        size += stretch.norm_squared();
-        loose += stretch.norm_squared() / problem.marker_information(plate, m);
+/// Where the markers of a plate that were seen should be, by its file, and where they are.
+fn places(problem: &Problem, shape: &PlateShape, plate: usize) -> Vec<[Vector3<f64>; 2]> {
+    let stated = |m: usize| problem.plates[plate].markers[m].position_m;
+    seen_markers(problem, plate).into_iter().map(|m| [stated(m), shape.position(m)]).collect()
+}
+
+/// By how much the markers of a plate that were seen lie further apart than its file says.
+fn growth(problem: &Problem, shape: &PlateShape, plate: usize) -> Option<f64> {
+    let places = places(problem, shape, plate);
+    let middle = places.iter().map(|[stated, _]| stated).sum::<Vector3<f64>>() / places.len().max(1) as f64;
+    let (mut along, mut square) = (0.0, 0.0);
+    for [stated, found] in &places {
+        along += (stated - middle).dot(&(found - stated));
+        square += (stated - middle).norm_squared();
     }
-    let prior = problem.layout.columns[problem.layout.shapes[plate].start + ASPECT].prior_sigma;
-    (size > 0.0).then(|| (along / size, prior.hypot(loose.sqrt() / size)))
+    (square > 0.0).then(|| along / square)
+}
+
+/// The same along x and along y, each with what the tolerance of the markers leaves open of it. What is turned or skew is none of it.
+fn stretch(Adjustment { problem, state }: &Adjustment, plate: usize) -> Option<[(f64, f64); 2]> {
+    let places = places(problem, &state.plates[plate], plate);
+    let of_marker = |m: usize| problem.marker_information(plate, m).recip();
+    let variance = seen_markers(problem, plate).into_iter().map(of_marker).sum::<f64>() / places.len().max(1) as f64;
+    let along = |axis: usize| {
+        let displaced = places.iter().map(|[stated, found]| (stated.xy(), found[axis] - stated[axis]));
+        let found = slopes(&displaced.collect::<Vec<_>>())?;
+        Some((found.of[axis], (variance * found.covariance[(axis, axis)]).sqrt()))
+    };
+    Some([along(0)?, along(1)?])
+}
+
+/// The x/y scale of the markers that were seen, corrections included, and its prior sigma.
+fn x_y_scale(adjustment: &Adjustment, plate: usize) -> Option<(f64, f64)> {
+    let layout = &adjustment.problem.layout;
+    let prior = layout.columns[layout.shapes[plate].start + ASPECT].prior_sigma;
+    stretch(adjustment, plate).map(|[x, y]| (x.0 - y.0, prior.hypot(x.1).hypot(y.1)))
 }

@@ -10,6 +10,9 @@ pub const MODES: usize = 7;
 /// The mode by which everything on the plate grows, radii of circles as well.
 pub const SCALE: usize = 0;
 
+/// The mode by which the plate is longer along x and shorter along y.
+pub const ASPECT: usize = 1;
+
 /// The mode by which the radii of circles grow, those of inner edges shrink; it moves no marker. Ink spreads by hundredths of a millimetre.
 pub const DOT_GAIN: usize = 6;
 

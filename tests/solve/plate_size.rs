@@ -109,6 +109,27 @@ fn a_stretch_is_told_along_its_axis_and_stated_errors_are_without_it() {
     assert_eq!(stated(1.0, 1.0, None).uncertainty.flange.unwrap().without_size_doubt, None);
 }
 
+/// What it is beside its size takes no part in the fit that asks the links for it.
+#[test]
+fn a_print_that_is_stretched_and_too_small_is_told_along_both_axes() {
+    for (x, y) in [(1.0 / 0.97, 1.0 / 0.95), (1.0 / 0.98, 1.0 / 0.96), (1.0 / 1.03, 1.0 / 1.01)] {
+        let wrong = stated(x, y, None);
+        let along = wrong.findings.iter().find_map(|f| match f {
+            Finding::DoubtedSize(DoubtedSize::Uneven { along, .. }) => *along,
+            _ => None,
+        });
+        let along = along.unwrap_or_else(|| panic!("{:?}", wrong.findings));
+        println!("{x} {y}: {along:?}");
+        for ((found, sigma), factor) in along.into_iter().zip([x, y]) {
+            let put_in = 1.0 / factor - 1.0;
+            assert!((found - put_in).abs() < 3.0 * sigma && sigma < 3e-3, "{found} +- {sigma}, put in {put_in}");
+        }
+        // The tolerance of the markers leaves 0.28e-3 of it.
+        let apart = along[0].0 - along[1].0;
+        assert!((apart - (1.0 / x - 1.0 / y)).abs() < 0.9e-3, "{apart}");
+    }
+}
+
 /// The shape of a plate shows in images alone, its size does not.
 #[test]
 fn poses_alone_doubt_a_stretched_plate_and_no_other() {
@@ -117,10 +138,12 @@ fn poses_alone_doubt_a_stretched_plate_and_no_other() {
         let doubts = found.findings.iter().filter(|f| matches!(f, Finding::DoubtedSize(_)));
         doubts.map(|f| (f.code(), f.weight(), f.quantities()[0].value)).collect::<Vec<_>>()
     };
-    for (x, y) in [(1.01, 1.0), (1.0, 1.01)] {
+    for (x, y) in [(1.01, 1.0), (1.0, 1.01), (1.03, 1.0), (1.0, 1.03)] {
         let [(code, weight, found)] = off(x, y, None)[..] else { panic!("{x} {y}") };
         assert_eq!((code, weight), (Code::PlateUneven, Weight::Gate));
-        assert!((found - (1.0 / x - 1.0 / y)).abs() < 1e-3, "{found}");
+        // Of 8 x 6 markers, whose squares along x and y are as 63 to 35; their tolerance leaves 0.28e-3.
+        let size = (63.0 / x + 35.0 / y) / 98.0;
+        assert!((found - (1.0 / x - 1.0 / y) / size).abs() < 1e-3, "{x} {y}: {found}");
     }
     assert_eq!(off(1.0, 1.0, None), []);
     assert_eq!(off(1.01, 1.01, None), []);
