@@ -237,7 +237,7 @@ limits! {
     touches_for_one_left_out: usize = 5;
     /// Extent of touched places, m RMS about their middle, beyond which they are not in metres.
     touches_apart_m: f64 = 20.0;
-    /// Sigma of a touch, m, from which it is not in metres.
+    /// Sigma of a touch, m, from which it is not in metres. Files of a series are read below 0.01 m alone, whatever is given here.
     touch_sigma_m: f64 = 0.01;
     /// Extent of places across their line over that along it, below which they lie on a line: with touches of 0.1 mm the angle about it
     /// is worse than that of any gauge.

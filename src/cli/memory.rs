@@ -42,9 +42,11 @@ pub(super) fn in_a_child() -> Option<ExitCode> {
 const LARGEST_FROM_HEAP: usize = (32 << 20) - (64 << 10);
 
 /// glibc maps blocks that are larger than every one that was freed, and trims a heap by twice as much: the matrices of every step would be given
-/// back to the system and had from it again page by page. Once a large block was freed, they stay.
+/// back to the system and had from it again page by page. Once a large block was freed, they stay; not where memory is limited.
 pub(super) fn keep_freed() {
-    drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGEST_FROM_HEAP)));
+    if std::env::var_os(CHILD).is_none() {
+        drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGEST_FROM_HEAP)));
+    }
 }
 
 /// Threads for every core that serve any purpose.

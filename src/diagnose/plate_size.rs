@@ -179,12 +179,12 @@ impl Kind for DoubtedSize {
             Self::Uneven { off, along, told_by, .. } => format!(
                 "its rows and columns differ in scale by {:.2} %{}, so it was not made to size, and all lengths hang on its size",
                 100.0 * off.abs(),
-                along.map_or_else(String::new, |[(x, sigma), (y, _)]| format!(
+                along.map_or_else(String::new, |[(x, sigma_x), (y, sigma_y)]| format!(
                     " (by {} it is {:+.2} % along x and {:+.2} % along y, +- {:.2} %)",
                     told_by.name(),
                     100.0 * x,
                     100.0 * y,
-                    100.0 * sigma
+                    100.0 * sigma_x.max(sigma_y)
                 ))
             ),
         }
