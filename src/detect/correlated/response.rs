@@ -50,6 +50,9 @@ impl Sums {
     pub fn add(&mut self, part: &OddPart) {
         self.add_noise(part);
         let columns = columns_with_odd_part(part);
+        if columns.is_empty() {
+            return;
+        }
         let Fitted { own, all, once } = Fitted::of(part, &columns);
         // The lags in rows, both columns of `U` in columns.
         let [own, all] = [&own, &all].map(|m| DMatrixView::from_slice(m.as_slice(), UNKNOWN, columns.len().pow(2)));
