@@ -44,6 +44,9 @@ pub mod faq {}
 #[doc = include_str!("reading_the_result.md")]
 pub mod reading_the_result {}
 
+#[doc = include_str!("solution_file.md")]
+pub mod solution_file {}
+
 #[doc = include_str!("codes.md")]
 pub mod codes {}
 

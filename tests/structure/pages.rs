@@ -58,3 +58,34 @@ fn every_page_is_linked_and_a_module() {
     let missing: Vec<&String> = pages.iter().filter(|p| !is_module(p)).collect();
     assert!(missing.is_empty(), "no module of the guide: {missing:?}");
 }
+
+/// Keys of a JSON value, at any depth, but for the limits, which `Limits` documents.
+fn keys(value: &serde_json::Value, all: &mut BTreeSet<String>) {
+    match value {
+        serde_json::Value::Object(object) => object.iter().for_each(|(key, inner)| {
+            all.insert(key.clone());
+            if key != "limits" {
+                keys(inner, all);
+            }
+        }),
+        serde_json::Value::Array(entries) => entries.iter().for_each(|entry| keys(entry, all)),
+        _ => {}
+    }
+}
+
+#[test]
+fn every_key_of_a_solution_stands_in_the_manual() {
+    let page = fs::read_to_string(src().join("guide/solution_file.md")).unwrap();
+    let words: BTreeSet<&str> = page.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').collect();
+    let shipped = fs::read_to_string(src().join("../reports/kr6_small/solution.json")).unwrap();
+    let mut there = BTreeSet::new();
+    keys(&serde_json::from_str(&shipped).unwrap(), &mut there);
+    assert!(there.len() > 200, "only {} keys", there.len());
+    for file in ["solution_json", "bodies_record", "finding_record", "pose_record", "series_record"] {
+        let text = fs::read_to_string(src().join(format!("output/solution/{file}.rs"))).unwrap();
+        let fields = text.lines().filter_map(|l| l.trim().strip_prefix("pub ")?.split_once(": "));
+        there.extend(fields.map(|(name, _)| name.to_owned()).filter(|name| !name.contains(' ')));
+    }
+    let missing: Vec<&String> = there.iter().filter(|key| !words.contains(key.as_str())).collect();
+    assert!(missing.is_empty(), "not in guide/solution_file.md: {missing:?}");
+}
