@@ -259,54 +259,61 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
                       plate whose markers suit the camera (robotcal plate --focal-px)";
         return Error::new(Code::PlanViewless, "plan: views", what, remedy);
     }
-    let arm = setting.robot.chain.arm_length_m();
-    let foot = setting.robot.chain.base_from_foot();
-    let stands = if foot.is_none() { "base" } else { "foot of the robot" };
-    let foot = foot.unwrap_or_else(Pose::identity).translation;
-    let axes = setting.robot.chain.readings.len();
-    if tally.out_of_reach + tally.unseen == tally.views && axes < 6 {
+    if tally.out_of_reach + tally.unseen == tally.views {
+        return out_of_reach(setting, options, tally.out_of_reach);
+    }
+    all_collide(setting, scene, options, tally.colliding)
+}
+
+/// None of the `workable` views is in reach of the arm.
+fn out_of_reach(setting: &Setting, options: &CandidateOptions, workable: usize) -> Error {
+    let chain = &setting.robot.chain;
+    let axes = chain.readings.len();
+    if axes < 6 {
         let what =
             format!("an arm of {axes} axes cannot take the views that are drawn, which are free in all six directions");
         let remedy = "choose its postures by hand, spread over all joints; identify --dry-run says what they tell";
         return Error::new(Code::PlanOutOfReach, "plan: robot", what, remedy);
     }
-    if tally.out_of_reach + tally.unseen == tally.views {
-        let (thing, distance, remedy) = match setting.mount {
-            CameraMount::Hand => (
-                "plate",
-                setting.placements.iter().map(|p| (p.1.translation - foot).norm()).fold(0.0, f64::max),
-                format!(
-                    "put the plate (--plate-pose) nearer, about {:.2} m from the {stands} with its face up and towards the robot, \
-                     or check --hand-camera",
-                    0.55 * arm
-                ),
+    let arm = chain.arm_length_m();
+    let foot = chain.base_from_foot();
+    let stands = if foot.is_none() { "base" } else { "foot of the robot" };
+    let foot = foot.unwrap_or_else(Pose::identity).translation;
+    let well = 0.55 * arm;
+    let (thing, distance, remedy) = match setting.mount {
+        CameraMount::Hand => (
+            "plate",
+            setting.placements.iter().map(|p| (p.1.translation - foot).norm()).fold(0.0, f64::max),
+            format!(
+                "put the plate (--plate-pose) nearer, about {well:.2} m from the {stands} with its face up and towards the robot, \
+                 or check --hand-camera"
             ),
-            CameraMount::Fixed => (
-                "camera",
-                (setting.mounting.translation - foot).norm(),
-                format!(
-                    "put the camera (--hand-camera) where its view, {:.2} to {:.2} m long, ends about {:.2} m from the {stands} (its z \
-                     looks along the view), allow other distances (--distance-m), or check --plate-pose on the flange",
-                    options.views.near_m,
-                    options.views.far_m,
-                    0.55 * arm
-                ),
+        ),
+        CameraMount::Fixed => (
+            "camera",
+            (setting.mounting.translation - foot).norm(),
+            format!(
+                "put the camera (--hand-camera) where its view, {:.2} to {:.2} m long, ends about {well:.2} m from the {stands} (its z \
+                 looks along the view), allow other distances (--distance-m), or check --plate-pose on the flange",
+                options.views.near_m, options.views.far_m
             ),
-        };
-        let what = format!(
-            "none of {} workable views is in reach: the {thing} stands {distance:.2} m from the {stands}, the arm is {arm:.2} m long",
-            tally.out_of_reach
-        );
-        return Error::new(Code::PlanOutOfReach, format!("plan: {thing}"), what, remedy);
-    }
+        ),
+    };
+    let what = format!(
+        "none of {workable} workable views is in reach: the {thing} stands {distance:.2} m from the {stands}, the arm is {arm:.2} m long"
+    );
+    Error::new(Code::PlanOutOfReach, format!("plan: {thing}"), what, remedy)
+}
+
+/// Every posture that reaches a workable view touches something.
+fn all_collide(setting: &Setting, scene: &Scene, options: &CandidateOptions, postures: usize) -> Error {
     let example = (0..64).find_map(|k| {
         let mut rng = ChaCha8Rng::seed_from_u64(k);
         let limits = narrowed_limits(setting, options.limit_margin);
         scene.collision(&random_readings(&limits, &setting.robot.chain.reading_kinds, &mut rng), 0)
     });
     let what = format!(
-        "all {} postures that reach a workable view collide{}",
-        tally.colliding,
+        "all {postures} postures that reach a workable view collide{}",
         example.map_or(String::new(), |e| format!(" (for example {e})"))
     );
     let remedy = "check boxes and table (--box, --table-z-m), allow less clearance (--clearance-mm) or thinner links \

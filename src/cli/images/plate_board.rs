@@ -1,7 +1,6 @@
 //! `robotcal plate --kind`: draws a board of any kind but coded circles, which are designed.
 
-use std::cell::RefCell;
-use std::fmt::Write;
+use std::fmt::Display;
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
@@ -136,77 +135,106 @@ fn plate(args: &BoardArgs, size: &BoardSize) -> Result<Plate> {
         let remedy = "leave it out; a charuco board, an aprilgrid, an aruco-grid and a tag have ids that may begin elsewhere than at 0";
         return Err(Error::new(Code::OptionConflict, "--id", what, remedy));
     }
-    let mut text =
-        format!("format = 1\nkind = \"{}\"\ntolerance_m = {:?}\n", kind_name(args.kind), size.tolerance_mm / 1e3);
-    let mut key = |name: &str, value: String| writeln!(text, "{name} = {value}").unwrap_or_default();
-    let metres = |mm: f64| format!("{:?}", mm / 1e3);
-    let quoted = |name: &Option<String>| name.as_ref().map(|n| format!("{n:?}"));
-    let lacking = RefCell::new(Vec::new());
-    let needed = |flag: &'static str, value: Option<String>| {
-        value.unwrap_or_else(|| {
-            lacking.borrow_mut().push(flag);
-            String::new()
-        })
-    };
-    if args.kind != Kind::Tag {
-        let [columns, rows] = [0, 1].map(|k| size.shape.map(|shape| shape[k].to_string()));
-        key("columns", needed("--shape", columns));
-        key("rows", rows.unwrap_or_default());
-    }
-    let tag = || needed("--tag-mm", args.tag_mm.map(metres));
-    let pitch = || needed("--pitch-mm", size.pitch_mm.map(metres));
-    let dictionary = || needed("--dictionary", quoted(&args.dictionary));
-    match args.kind {
-        Kind::CodedCircles | Kind::Chessboard => key("pitch_m", pitch()),
-        Kind::CircleGrid => {
-            let dots = size.pitch_mm.map(|mm| args.radius_mm.unwrap_or(0.25 * mm)).map(metres);
-            key("pitch_m", pitch());
-            key("radius_m", dots.unwrap_or_default());
-            key("asymmetric", args.asymmetric.to_string());
-            key("large", format!("{:?}", args.large));
-        }
-        Kind::Charuco => {
-            key("pitch_m", pitch());
-            key("aruco", format!("{{ dictionary = {}, side_m = {}, first_id = {} }}", dictionary(), tag(), args.id));
-        }
-        Kind::Puzzleboard => {
-            let [column, row] = args.origin.unwrap_or_default();
-            key("pitch_m", pitch());
-            key("origin_col", column.to_string());
-            key("origin_row", row.to_string());
-        }
-        Kind::Aprilgrid => {
-            key("tag_m", tag());
-            key("spacing", format!("{:?}", args.spacing.unwrap_or(0.3)));
-            key("family", quoted(&args.family).unwrap_or_else(|| "\"36h11\"".to_owned()));
-            key("first_id", args.id.to_string());
-        }
-        Kind::ArucoGrid => {
-            key("marker_m", tag());
-            key("gap_m", needed("--gap-mm", args.gap_mm.map(metres)));
-            key("dictionary", dictionary());
-            key("first_id", args.id.to_string());
-        }
-        Kind::Tag => {
-            key("tag_m", tag());
-            key("id", args.id.to_string());
-            match quoted(&args.family) {
-                Some(family) => key("family", family),
-                None => key("dictionary", dictionary()),
-            }
-        }
-    }
-    let lacking = lacking.into_inner();
-    if !lacking.is_empty() {
-        return Err(missing(&lacking.join(", "), &kind_name(args.kind)));
-    }
-    let mut plate = parse_plate(Path::new("plate.toml"), &text, "")?;
+    let mut plate = parse_plate(Path::new("plate.toml"), &PlateText::of(args, size)?, "")?;
     for id in std::mem::take(&mut plate.large) {
         if let Some(k) = plate.index_of(id) {
             plate.markers[k].outer_radius_m *= LARGER;
         }
     }
     Ok(plate)
+}
+
+/// The text of a plate.toml as it is written from flags.
+#[derive(Default)]
+struct PlateText {
+    text: String,
+    lacking: Vec<&'static str>,
+}
+
+impl PlateText {
+    /// The text; an error names all flags that are lacking.
+    fn of(args: &BoardArgs, size: &BoardSize) -> Result<String> {
+        let mut made = Self::default();
+        made.key("format", 1);
+        made.key("kind", quoted(&kind_name(args.kind)));
+        made.key("tolerance_m", metres(size.tolerance_mm));
+        if args.kind != Kind::Tag {
+            let [columns, rows] = [0, 1].map(|k| size.shape.map(|shape| shape[k]));
+            made.needed("columns", "--shape", columns);
+            made.key("rows", rows.unwrap_or_default());
+        }
+        made.keys_of_kind(args, size.pitch_mm);
+        if made.lacking.is_empty() {
+            Ok(made.text)
+        } else {
+            Err(missing(&made.lacking.join(", "), &kind_name(args.kind)))
+        }
+    }
+
+    fn keys_of_kind(&mut self, args: &BoardArgs, pitch_mm: Option<f64>) {
+        let [pitch, tag, gap] = [pitch_mm, args.tag_mm, args.gap_mm].map(|mm| mm.map(metres));
+        let [dictionary, family] = [&args.dictionary, &args.family].map(|name| name.as_deref().map(quoted));
+        match args.kind {
+            Kind::CodedCircles | Kind::Chessboard => self.needed("pitch_m", "--pitch-mm", pitch),
+            Kind::CircleGrid => {
+                self.needed("pitch_m", "--pitch-mm", pitch);
+                self.key("radius_m", metres(args.radius_mm.or(pitch_mm.map(|mm| 0.25 * mm)).unwrap_or_default()));
+                self.key("asymmetric", args.asymmetric);
+                self.key("large", format!("{:?}", args.large));
+            }
+            Kind::Charuco => {
+                self.needed("pitch_m", "--pitch-mm", pitch);
+                self.needed("aruco.dictionary", "--dictionary", dictionary);
+                self.needed("aruco.side_m", "--tag-mm", tag);
+                self.key("aruco.first_id", args.id);
+            }
+            Kind::Puzzleboard => {
+                let [column, row] = args.origin.unwrap_or_default();
+                self.needed("pitch_m", "--pitch-mm", pitch);
+                self.key("origin_col", column);
+                self.key("origin_row", row);
+            }
+            Kind::Aprilgrid => {
+                self.needed("tag_m", "--tag-mm", tag);
+                self.key("spacing", format!("{:?}", args.spacing.unwrap_or(0.3)));
+                self.key("family", family.unwrap_or_else(|| quoted("36h11")));
+                self.key("first_id", args.id);
+            }
+            Kind::ArucoGrid => {
+                self.needed("marker_m", "--tag-mm", tag);
+                self.needed("gap_m", "--gap-mm", gap);
+                self.needed("dictionary", "--dictionary", dictionary);
+                self.key("first_id", args.id);
+            }
+            Kind::Tag => {
+                self.needed("tag_m", "--tag-mm", tag);
+                self.key("id", args.id);
+                match family {
+                    Some(family) => self.key("family", family),
+                    None => self.needed("dictionary", "--dictionary", dictionary),
+                }
+            }
+        }
+    }
+
+    fn key(&mut self, name: &str, value: impl Display) {
+        self.text.push_str(&format!("{name} = {value}\n"));
+    }
+
+    fn needed(&mut self, name: &str, flag: &'static str, value: Option<impl Display>) {
+        match value {
+            Some(value) => self.key(name, value),
+            None => self.lacking.push(flag),
+        }
+    }
+}
+
+fn metres(mm: f64) -> String {
+    format!("{:?}", mm / 1e3)
+}
+
+fn quoted(name: &str) -> String {
+    format!("{name:?}")
 }
 
 fn kind_name(kind: Kind) -> String {

@@ -397,80 +397,97 @@ fn work_moved(
 }
 
 fn named(undone: &Undone, left: &FrameFit, touches: &Touches) -> MistakeKind {
-    let first = |from: usize| {
-        let touch = touches.all.iter().find(|t| t.posture == from);
-        touch.map_or_else(String::new, |t| t.stop.clone())
-    };
     let (code, what, remedy) = match &undone.what {
         What::Kind(kind) => return kind.clone(),
-        What::Place(place) => {
-            let found = left.places.last().copied().unwrap_or(*place);
-            let of: BTreeSet<&str> =
-                touches.all.iter().filter(|t| t.seen == Seen::Point(*place)).map(|t| t.stop.as_str()).collect();
-            let more = if of.len() > NAMED { ", .." } else { "" };
-            let names: Vec<&str> = of.into_iter().take(NAMED).collect();
-            let what = format!(
-                "the place {} that was touched at {}{more} is at {} by the others, {:.2} mm away",
-                in_metres(place),
-                names.join(", "),
-                in_metres(&found),
-                1e3 * (found - place).norm()
-            );
-            (Code::PlaceContradicted, what, "correct it in contacts.csv, or touch the point that was meant".to_owned())
-        }
-        What::Touch(k, place) => {
-            let found = left.places.last().copied().unwrap_or(*place);
-            let what = format!(
-                "the touch at {} was not of the place {}: by the others it was at {}, {:.2} mm away",
-                touches.all[*k].stop,
-                in_metres(place),
-                in_metres(&found),
-                1e3 * (found - place).norm()
-            );
-            (Code::PlaceContradicted, what, "correct its row in contacts.csv, or leave it out".to_owned())
-        }
-        What::OneOf(stops) => {
-            let what = format!(
-                "one of the touches at {} was not of the place that is said: whichever is taken as wrong, the others fit, and they do not tell which",
-                stops.join(", ")
-            );
-            let remedy = "touch these points again, and some more with the tip turned another way";
-            (Code::PlaceContradicted, what, remedy.to_owned())
-        }
-        What::GivenTool(tool) => {
-            let found = &left.tools[0];
-            let what = format!(
-                "the tool that was given misses: by the touches its point is at {} on the tip, {:.2} mm away",
-                in_metres(&found.translation),
-                1e3 * (found.translation - tool.translation).norm()
-            );
-            let remedy = "leave --tool out: the touches find it; or give the frame of the tool as it is mounted now";
-            (Code::ToolContradicted, what, remedy.to_owned())
-        }
-        What::Tool { from } => {
-            let half = touches.bodies.len();
-            let moved = left.tools[half].translation - left.tools[0].translation;
-            let what = format!(
-                "from {} on the point of the tool is {:.2} mm elsewhere on the tip: it was bent, exchanged or came loose",
-                first(*from),
-                1e3 * moved.norm()
-            );
-            let remedy = format!("use the touches before {}, or those from it on", first(*from));
-            (Code::TargetDisplaced, what, remedy)
-        }
-        What::Work { from, moved } => {
-            let places: Vec<Vector3<f64>> = touches.placed().map(|(_, place)| place).collect();
-            let middle = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
-            let what = format!(
-                "from {} on the work object stands {:.2} mm, {:.2} mrad elsewhere: it was moved, or the base of the robot, or the zero of a joint slipped",
-                first(*from),
-                1e3 * (moved.transform(&middle) - middle).norm(),
-                1e3 * log_so3(&moved.rotation).norm()
-            );
-            (Code::WorkDisplaced, what, format!("use the touches before {}, or those from it on", first(*from)))
-        }
+        What::Place(place) => place_elsewhere(place, left, touches),
+        What::Touch(k, place) => touch_elsewhere(&touches.all[*k].stop, place, left),
+        What::OneOf(stops) => untold(stops),
+        What::GivenTool(tool) => tool_elsewhere(tool, left),
+        What::Tool { from } => tool_moved(&stop_at(*from, touches), left, touches),
+        What::Work { from, moved } => work_elsewhere(&stop_at(*from, touches), moved, touches),
     };
     MistakeKind::Poses { code, what, remedy }
+}
+
+/// Code, what was seen, remedy.
+type Words = (Code, String, String);
+
+/// Name of the first stop with a posture.
+fn stop_at(posture: usize, touches: &Touches) -> String {
+    let touch = touches.all.iter().find(|t| t.posture == posture);
+    touch.map_or_else(String::new, |t| t.stop.clone())
+}
+
+fn place_elsewhere(place: &Vector3<f64>, left: &FrameFit, touches: &Touches) -> Words {
+    let found = left.places.last().unwrap_or(place);
+    let of: BTreeSet<&str> =
+        touches.all.iter().filter(|t| t.seen == Seen::Point(*place)).map(|t| t.stop.as_str()).collect();
+    let more = if of.len() > NAMED { ", .." } else { "" };
+    let names: Vec<&str> = of.into_iter().take(NAMED).collect();
+    let what = format!(
+        "the place {} that was touched at {}{more} is at {} by the others, {:.2} mm away",
+        in_metres(place),
+        names.join(", "),
+        in_metres(found),
+        1e3 * (found - place).norm()
+    );
+    (Code::PlaceContradicted, what, "correct it in contacts.csv, or touch the point that was meant".to_owned())
+}
+
+fn touch_elsewhere(stop: &str, place: &Vector3<f64>, left: &FrameFit) -> Words {
+    let found = left.places.last().unwrap_or(place);
+    let what = format!(
+        "the touch at {stop} was not of the place {}: by the others it was at {}, {:.2} mm away",
+        in_metres(place),
+        in_metres(found),
+        1e3 * (found - place).norm()
+    );
+    (Code::PlaceContradicted, what, "correct its row in contacts.csv, or leave it out".to_owned())
+}
+
+fn untold(stops: &[String]) -> Words {
+    let what = format!(
+        "one of the touches at {} was not of the place that is said: whichever is taken as wrong, the others fit, and they do not tell which",
+        stops.join(", ")
+    );
+    let remedy = "touch these points again, and some more with the tip turned another way";
+    (Code::PlaceContradicted, what, remedy.to_owned())
+}
+
+fn tool_elsewhere(tool: &Pose, left: &FrameFit) -> Words {
+    let found = &left.tools[0];
+    let what = format!(
+        "the tool that was given misses: by the touches its point is at {} on the tip, {:.2} mm away",
+        in_metres(&found.translation),
+        1e3 * (found.translation - tool.translation).norm()
+    );
+    let remedy = "leave --tool out: the touches find it; or give the frame of the tool as it is mounted now";
+    (Code::ToolContradicted, what, remedy.to_owned())
+}
+
+fn tool_moved(from: &str, left: &FrameFit, touches: &Touches) -> Words {
+    let half = touches.bodies.len();
+    let moved = left.tools[half].translation - left.tools[0].translation;
+    let what = format!(
+        "from {from} on the point of the tool is {:.2} mm elsewhere on the tip: it was bent, exchanged or came loose",
+        1e3 * moved.norm()
+    );
+    (Code::TargetDisplaced, what, before_or_after(from))
+}
+
+fn work_elsewhere(from: &str, moved: &Pose, touches: &Touches) -> Words {
+    let places: Vec<Vector3<f64>> = touches.placed().map(|(_, place)| place).collect();
+    let middle = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
+    let what = format!(
+        "from {from} on the work object stands {:.2} mm, {:.2} mrad elsewhere: it was moved, or the base of the robot, or the zero of a joint slipped",
+        1e3 * (moved.transform(&middle) - middle).norm(),
+        1e3 * log_so3(&moved.rotation).norm()
+    );
+    (Code::WorkDisplaced, what, before_or_after(from))
+}
+
+fn before_or_after(from: &str) -> String {
+    format!("use the touches before {from}, or those from it on")
 }
 
 /// A place in words.
