@@ -119,6 +119,7 @@ codes! {
         CameraUnknown "camera_unknown" "a table names a camera that series.toml does not have",
         StopUnknown "stop_unknown" "a table names a stop that joints.csv does not have",
         CsvRowTwice "csv_row_twice" "two rows say the same thing",
+        RowsByTime "rows_by_time" "rows of a series stand in another order than their times",
     }
     Input "Robot description" {
         UrdfSyntax "urdf_syntax" "a robot description is no well-formed URDF, or readers take it differently",
@@ -387,6 +388,7 @@ codes! {
         ToolContradicted "tool_contradicted" "the tool that was given is not where the touches have it",
         PlaceContradicted "place_contradicted" "a place that was touched is not where the other touches have it",
         TouchedFromBelow "touched_from_below" "the tool came from below the plane of the touched places",
+        WorkCarried "work_carried" "a work object is stated in a link that the joints of the robot move",
         WorkDisplaced "work_displaced" "the work object, or the fixture of all sockets, stands elsewhere from some touch on",
         FramesUnknown "frames_unknown" "base and tool of the real robot are known worse than the correction is large",
         FramesNominal "frames_nominal" "base and tool were taken as nominal, as asked for",

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::controller_poses::{ControllerPoses, ReadOtherwise};
 use super::inputs::InputFile;
-use super::joints::{DEFAULT_PLACEMENT, SeriesStop, Stops, key_column, placement, stop_name};
+use super::joints::{DEFAULT_PLACEMENT, SeriesStop, Stops, key_column, order_of_visiting, placement, stop_name};
 use super::quaternion::quaternion;
 use super::rotation_kind::RotationKind;
 use super::stop_index::{position, position_columns};
@@ -29,6 +29,7 @@ const FARTHEST_M: f64 = 50.0;
 const LARGEST_RAD: f64 = 2.0 * std::f64::consts::PI + 1e-3;
 
 /// A pose as it is written.
+#[derive(Clone)]
 struct Written {
     position_m: Vector3<f64>,
     rotation: Matrix3<f64>,
@@ -83,6 +84,9 @@ fn from_table(table: &Table, kind: RotationKind) -> Result<(Stops, ControllerPos
         return Err(Error::new(Code::FileEmpty, table.place_of_header(), "has no row with a pose", remedy));
     }
     refuse_units(table, kind, &known)?;
+    if let Some(order) = order_of_visiting(&stops) {
+        (stops, poses) = order.into_iter().map(|k| (stops[k].clone(), poses[k].clone())).unzip();
+    }
     let stops = Stops { key, stops, ..Stops::default() };
     let stated_deg = vec![None; poses.len()];
     Ok((

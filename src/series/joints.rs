@@ -58,7 +58,7 @@ pub struct SeriesStop {
     pub raw_readings: Option<Vec<f64>>,
     /// Where the plate stood.
     pub placement: String,
-    /// Time of the image, s, on any clock.
+    /// Time of the image, s, on any clock. Where all stops have one, they were visited in its order.
     pub time_s: Option<f64>,
     /// What else was measured of the robot.
     pub covariates: Covariates,
@@ -121,9 +121,17 @@ impl Stops {
             let remedy = format!("give one row for every {}", columns.key.column());
             return Err(Error::new(Code::FileEmpty, table.place_of_header(), "has no rows", remedy));
         }
+        if let Some(order) = order_of_visiting(&stops) {
+            stops = order.into_iter().map(|k| stops[k].clone()).collect();
+        }
         let named = |columns: &[usize]| columns.iter().map(|&c| table.headers[c].clone()).collect::<Vec<_>>();
         let torque_joints = named(&columns.torques).iter().map(|c| c[TORQUE.len()..].to_owned()).collect();
         Ok(Self { joints: named(&columns.joints), key: columns.key, torque_joints, stops })
+    }
+
+    /// True where the rows of the file stand in another order than the stops, which is that of their times.
+    pub fn are_sorted_by_time(&self) -> bool {
+        !self.stops.iter().is_sorted_by_key(|s| s.line)
     }
 
     /// Index of the stop of that name.
@@ -221,6 +229,14 @@ impl Columns {
             line: row.line,
         })
     }
+}
+
+/// Indices of stops in the order of their times; `None` where not all have one, or they stand in that order.
+pub(super) fn order_of_visiting(stops: &[SeriesStop]) -> Option<Vec<usize>> {
+    let times: Vec<f64> = stops.iter().map(|s| s.time_s).collect::<Option<_>>()?;
+    let mut order: Vec<usize> = (0..times.len()).collect();
+    order.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
+    (!order.is_sorted()).then_some(order)
 }
 
 /// The column that names the stops, and what it names.

@@ -104,6 +104,11 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
         Source::Recording(recording)
     } else {
         (stops, controller) = stops_of(folder, &manifest, &manifest_path, &mut inputs)?;
+        let table = folder.join(controller_file::table_of_stops(folder));
+        notices.extend(stops.are_sorted_by_time().then(|| {
+            let what = "its rows stand in another order than their times (time_s): the stops are taken as visited in the order of time";
+            Notice::new(Code::RowsByTime, table.display(), what, "remove the column where it holds something else")
+        }));
         spatial = SpatialFiles::read(folder, &stops, &mut inputs, &mut notices)?;
         if by_cameras {
             Source::NoImages
@@ -111,10 +116,8 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
             let path = folder.join("observations.csv");
             observed(&path, &manifest, &plate, &stops, &mut inputs, &mut notices)?
         } else if is_seen {
-            let tables = [controller_file::NAME, "joints.csv"].map(|name| folder.join(name));
-            let table = if controller.is_some() { &tables[0] } else { &tables[1] };
             let lines: Vec<u64> = stops.stops.iter().map(|s| s.line).collect();
-            pictured(&folder.join("images"), (table, &lines), &mut stops, &mut notices)?
+            pictured(&folder.join("images"), (&table, &lines), &mut stops, &mut notices)?
         } else {
             Source::NoImages
         }

@@ -46,6 +46,17 @@ fn poses_stand_in_the_place_of_joint_readings() {
 }
 
 #[test]
+fn poses_go_with_their_stops_into_the_order_of_time() {
+    let timed = "stop,x_m,y_m,z_m,qx,qy,qz,qw,time_s\na,0.5,0.25,1,0,0,0,1,4\nb,0.5,0.125,1,1,0,0,0,3\noff,,,,,,,,1\n";
+    let series = read(folder(&[("controller.csv", timed)]).path()).unwrap();
+    let stops: Vec<_> = series.stops.stops.iter().map(|s| (s.image.as_str(), s.line)).collect();
+    assert_eq!(stops, [("off.png", 4), ("b.png", 3), ("a.png", 2)]);
+    let poses = series.controller.unwrap().base_from_flange;
+    assert_eq!(poses.iter().map(|p| p.map(|p| p.xyz()[1])).collect::<Vec<_>>(), [None, Some(0.125), Some(0.25)]);
+    assert_eq!(series.notices.iter().filter(|n| n.code == Code::RowsByTime).count(), 1);
+}
+
+#[test]
 fn what_the_manifest_must_say_is_asked_for() {
     let without = MANIFEST.replace("[controller]\nrotation = \"quaternion\"\n", "");
     assert_says(&refusal(&[("series.toml", &without)]), Code::SettingMissing, &["[controller]", "rotvec_rad"]);

@@ -185,6 +185,23 @@ fn placements_are_all_named_or_none() {
 }
 
 #[test]
+fn stops_were_visited_in_the_order_of_their_times() {
+    let timed = "image,j1,j2,x,time_s\na.png,0.1,1,0,12.5\nb.png,0.2,1,0,3\n";
+    let visited = |text: &str| {
+        let series = read(series_with(&[("joints.csv", text)]).path()).unwrap();
+        let stops: Vec<_> = series.stops.stops.iter().map(|s| (s.image.clone(), s.line)).collect();
+        (stops, series.notices.iter().map(|n| n.code).collect::<Vec<_>>())
+    };
+    let [a, b] = [("a.png".to_owned(), 2), ("b.png".to_owned(), 3)];
+    let (as_written, by_time) = (vec![a.clone(), b.clone()], vec![b, a]);
+    assert_eq!(visited(timed), (by_time, vec![Code::RowsByTime]));
+    assert_eq!(visited(&timed.replace("12.5", "2.5")), (as_written.clone(), vec![]));
+    // Where a time is missing, or all are the same, nothing is told.
+    assert_eq!(visited(&timed.replace("12.5", "")), (as_written.clone(), vec![]));
+    assert_eq!(visited(&timed.replace("12.5", "3")), (as_written, vec![]));
+}
+
+#[test]
 fn images_and_rows_are_held_against_each_other() {
     let folder = series_with(&[("images/extra.png", ""), ("images/notes.txt", ""), ("dark/1.png", "")]);
     fs::remove_file(folder.path().join("images/b.png")).unwrap();
