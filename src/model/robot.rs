@@ -271,30 +271,29 @@ impl Robot {
         let down = Vector3::new(0.0, 0.0, -1.0);
         let above = self.chain.climbed().checked_sub(1).filter(|_| self.chain.base_moves());
         let weight = above.map_or(down, |above| poses[above].rotation * down);
-        let levers = |index: usize| levers(&joints[index].axis).map(|l| poses[index].rotation * l);
-        let centre_of = |m: &CarriedMass| match joints[m.joint].upwards {
-            // In the child link, which lies before the motion.
-            true => m.joint.checked_sub(1).map_or(m.centre_m, |before| poses[before].transform(&m.centre_m)),
-            false => poses[m.joint].transform(&m.centre_m),
+        // What a joint carries lies before its motion where it is passed upwards, which is about the axis the other way.
+        let carried = |index: usize| match joints[index].upwards {
+            true => index.checked_sub(1).map_or_else(Pose::identity, |before| poses[before]),
+            false => poses[index],
         };
+        let axis_of = |index: usize| if joints[index].upwards { -joints[index].axis } else { joints[index].axis };
+        let levers = |index: usize| levers(&axis_of(index)).map(|l| carried(index).rotation * l);
         for (k, &(index, reading)) in driven.iter().enumerate() {
-            let axis = poses[index].rotation * joints[index].axis;
+            let axis = poses[index].rotation * axis_of(index);
             let moment = |lever: Vector3<f64>| match joints[index].kind {
                 JointKind::Prismatic => axis.dot(&weight),
                 _ => axis.dot(&lever.cross(&weight)),
             };
-            let of_mass = |m: &CarriedMass| m.mass_kg * moment(centre_of(m) - poses[index].translation);
+            let of_mass = |m: &CarriedMass| {
+                m.mass_kg * moment(carried(m.joint).transform(&m.centre_m) - poses[index].translation)
+            };
             let largest = self.chain.largest_moment(index);
             if largest > 0.0 {
-                let carried = self.chain.masses_on(index).map(of_mass).sum::<f64>() / largest;
-                contexts[reading].moment = if joints[index].upwards { -carried } else { carried };
-            }
-            // Levers lie in the links behind a joint, which are not those that one passed upwards carries.
-            if joints[index].upwards {
-                continue;
+                contexts[reading].moment = self.chain.masses_on(index).map(of_mass).sum::<f64>() / largest;
             }
             let own = levers(index).map(moment);
-            let next = driven.get(k + 1).map_or([0.0; 2], |&(next, _)| levers(next).map(moment));
+            let farther = if joints[index].upwards { k.checked_sub(1) } else { Some(k + 1) };
+            let next = farther.and_then(|k| driven.get(k)).map_or([0.0; 2], |&(next, _)| levers(next).map(moment));
             contexts[reading].gravity = [own[0], own[1], next[0], next[1]];
         }
     }

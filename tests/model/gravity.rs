@@ -141,3 +141,51 @@ fn masses_that_are_all_the_same_are_placeholders() {
     assert!(robot.chain(None, None).unwrap().masses.is_empty());
     assert!(robot.notices.iter().any(|n| n.code == Code::UrdfMassPlaceholder), "{:?}", robot.notices);
 }
+
+/// Two arms of three joints on one root, no masses stated.
+fn two_arms() -> RobotDescription {
+    let joint = |name: &str, parent: &str, child: &str, origin: &str, axis: &str| {
+        format!(
+            r#"<link name="{child}"/><joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/><origin {origin}/>
+            <axis xyz="{axis}"/><limit lower="-3" upper="3" effort="0" velocity="1"/></joint>"#
+        )
+    };
+    let arm = |side: &str, x: f64| {
+        let link = |k: u8| format!("{side}_{k}");
+        [
+            joint(&format!("{side}1"), "root", &link(1), &format!(r#"xyz="{x} 0.1 0.3" rpy="0.2 -0.1 0.4""#), "0 0 1"),
+            joint(&format!("{side}2"), &link(1), &link(2), r#"xyz="0.05 0 0.25" rpy="-1.5 0.1 0""#, "0 1 0"),
+            joint(&format!("{side}3"), &link(2), &link(3), r#"xyz="0.4 0.02 0" rpy="0.3 0 -0.2""#, "-1 0.5 0"),
+        ]
+        .concat()
+    };
+    let text = format!(r#"<robot name="two"><link name="root"/>{}{}</robot>"#, arm("a", 0.0), arm("b", 1.2));
+    RobotDescription::from_text(Path::new("two.urdf"), text).unwrap()
+}
+
+#[test]
+fn an_arm_that_carries_the_plate_sags_as_by_itself() {
+    let cell = two_arms();
+    let both = cell.chain(Some("b_3"), Some("a_3")).unwrap();
+    let [left, right] = ["a_3", "b_3"].map(|tip| cell.chain(Some("root"), Some(tip)).unwrap());
+    let at = [("a1", 0.3), ("a2", -0.7), ("a3", 0.5), ("b1", -0.4), ("b2", 0.9), ("b3", -1.1)];
+    let readings = |chain: &Chain| -> Vec<f64> {
+        chain.readings.iter().map(|r| at.iter().find(|(name, _)| name == r).unwrap().1).collect()
+    };
+    let root_from_left = Robot::nominal(left.clone()).base_from_tip(&readings(&left));
+    for joint in ["b1", "b2", "b3"] {
+        for lever in 0..4 {
+            let sagging = |chain: &Chain| {
+                let reading = chain.readings.iter().position(|r| r == joint).unwrap();
+                let terms = vec![JointTerm { reading, term: Term::Gravity(lever), value: 1e-2 }];
+                Robot { terms, ..Robot::nominal(chain.clone()) }.base_from_tip(&readings(chain))
+            };
+            let moved = sagging(&right) * sagging(&both);
+            assert!((moved.matrix() - root_from_left.matrix()).amax() < 1e-12, "{joint}, lever {lever}");
+            let nominal = Robot::nominal(right.clone()).base_from_tip(&readings(&right));
+            let turned = (sagging(&right).matrix() - nominal.matrix()).amax();
+            // Nothing moves behind the last joint.
+            assert_eq!(turned > 1e-5, joint != "b3" || lever < 2, "{joint}, lever {lever}: {turned}");
+        }
+    }
+}
