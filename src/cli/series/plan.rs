@@ -413,6 +413,12 @@ fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)>
         }
         let model = asked.unwrap_or_else(|| plan_start::model_of(&record, &chain));
         let (mut setting, taken) = plan_start::from_solution(&record, chain, model)?;
+        let others = record.images.iter().filter(|i| i.is_used_on_robot()).count() - taken.len();
+        if others > 0 {
+            say_line!(
+                "images    {others} of other cameras, mountings or plates than the first image are not counted: the accuracy before and after is that without them"
+            );
+        }
         for (k, text) in args.plate_pose.iter().enumerate() {
             setting.placements.push((format!("new_{k}"), pose_or_file("--plate-pose", text)?));
         }

@@ -47,7 +47,8 @@ pub fn read_pose(path: &Path) -> Result<Pose> {
 
 /// Setting and images of a solution: the robot as calibrated, its camera, mounting and placements, the images in use.
 ///
-/// Of several cameras and mountings the first image on the robot decides; `chain` is that of the URDF given.
+/// Of several cameras, mountings and plates the first image on the robot decides, and so it does of the placements: those at which its plate was
+/// seen by cameras that are mounted as its own. `chain` is that of the URDF given.
 ///
 /// # Errors
 /// A solution of another robot, or without images on the robot.
@@ -69,14 +70,23 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
     let used = |i: &&ImageRecord| {
         i.is_used_on_robot() && (i.camera, i.mounting, i.plate) == (first.camera, first.mounting, first.plate)
     };
-    let stops: Vec<PlannedStop> =
-        record.images.iter().filter(used).filter_map(|i| taken(i, camera.pixel_factor, record)).collect();
+    let shows = |i: &ImageRecord| i.is_on_robot() && (i.camera_mount, i.plate) == (first.camera_mount, first.plate);
+    let placements: Vec<usize> =
+        (0..record.placements.len()).filter(|&k| record.images.iter().any(|i| shows(i) && i.placement == k)).collect();
+    let stop = |i: &ImageRecord| {
+        let placement = placements.iter().position(|k| *k == i.placement)?;
+        taken(i, placement, camera.pixel_factor, record)
+    };
+    let stops: Vec<PlannedStop> = record.images.iter().filter(used).filter_map(stop).collect();
     let setting = Setting {
         robot: calibrated(record, chain, model),
         camera: lens,
         mount: first.camera_mount,
         mounting: (&record.mountings[first.mounting].pose).into(),
-        placements: record.placements.iter().map(|p| (p.name.clone(), (&p.pose).into())).collect(),
+        placements: placements
+            .iter()
+            .map(|&k| (record.placements[k].name.clone(), (&record.placements[k].pose).into()))
+            .collect(),
         plate: plate(record, first.plate),
         pixel_sigma_px: typical_sigma(&stops),
         joint_sigma: camera.joint_noise.clone(),
@@ -129,7 +139,7 @@ fn plate(record: &SolutionRecord, index: usize) -> Plate {
 }
 
 /// A stop of the solution, with the observations in use at the place where they are predicted; `None` off the robot.
-fn taken(image: &ImageRecord, pixel_factor: f64, record: &SolutionRecord) -> Option<PlannedStop> {
+fn taken(image: &ImageRecord, placement: usize, pixel_factor: f64, record: &SolutionRecord) -> Option<PlannedStop> {
     let plate = &record.plates[image.plate];
     let posture = Posture { readings: image.readings.clone()?, approach: image.approach.clone() };
     let image = Image {
@@ -138,7 +148,7 @@ fn taken(image: &ImageRecord, pixel_factor: f64, record: &SolutionRecord) -> Opt
         stop: 0,
         camera: 0,
         mounting: 0,
-        placement: image.placement,
+        placement,
         plate: 0,
         mount: image.camera_mount,
         observations: observations(&image.observations, pixel_factor, &plate.id).into(),
@@ -178,4 +188,28 @@ fn typical_sigma(stops: &[PlannedStop]) -> f64 {
         .collect();
     all.sort_by(f64::total_cmp);
     all.get(all.len() / 2).copied().unwrap_or(0.05)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::from_solution;
+    use crate::identify::RobotModel;
+    use crate::output::restore::{chain, robot_description};
+    use crate::output::solution_json::SolutionRecord;
+    use crate::series::CameraMount;
+
+    #[test]
+    fn further_images_are_of_plates_that_the_camera_can_see() {
+        let mut record = SolutionRecord::with_both_mounts();
+        let own = chain(&record, &robot_description(&record).unwrap(), &record.robot.base, &record.robot.tip).unwrap();
+        let of_first = |record: &SolutionRecord| {
+            let (setting, stops) = from_solution(record, own.clone(), RobotModel::Rigid).unwrap();
+            let names: Vec<String> = setting.placements.iter().map(|p| p.0.clone()).collect();
+            assert!(stops.iter().all(|s| s.image.placement == 0 && s.image.mount == setting.mount));
+            (setting.mount, names, stops.len())
+        };
+        assert_eq!(of_first(&record), (CameraMount::Hand, vec!["placement_0".to_owned()], 12));
+        record.images.rotate_left(12);
+        assert_eq!(of_first(&record), (CameraMount::Fixed, vec!["carried".to_owned()], 12));
+    }
 }

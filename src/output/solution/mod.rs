@@ -10,6 +10,7 @@ mod check;
 pub mod estimates;
 pub mod finding_record;
 pub mod image_records;
+mod mounts;
 pub mod photogrammetry;
 pub mod pose_record;
 pub mod residuals;

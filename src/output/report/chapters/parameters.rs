@@ -173,13 +173,20 @@ pub(in crate::output::report) fn undetermined(r: &SolutionRecord) -> Markup {
 
 /// Poses of cameras and plates.
 pub(in crate::output::report) fn placed(r: &SolutionRecord) -> Markup {
-    let fixed_camera = r.images.iter().any(|i| i.camera_mount == CameraMount::Fixed);
-    let (camera, plate) = match fixed_camera {
-        false => (&r.robot.tip, &r.robot.base),
-        true => (&r.robot.base, &r.robot.tip),
+    let parents = |mount: Option<CameraMount>| match mount {
+        Some(CameraMount::Fixed) => (&r.robot.base, &r.robot.tip),
+        _ => (&r.robot.tip, &r.robot.base),
     };
-    let cameras = r.mountings.iter().map(|m| (format!("camera in {camera}"), m, r.mountings.len()));
-    let plates = r.placements.iter().map(|p| (format!("plate in {plate}"), p, r.placements.len()));
+    let cameras = r
+        .mountings
+        .iter()
+        .enumerate()
+        .map(|(k, m)| (format!("camera in {}", parents(r.mount_of_mounting(k)).0), m, r.mountings.len()));
+    let plates = r
+        .placements
+        .iter()
+        .enumerate()
+        .map(|(k, p)| (format!("plate in {}", parents(r.mount_of_placement(k)).1), p, r.placements.len()));
     if r.mountings.is_empty() && r.placements.is_empty() {
         return html! {};
     }
