@@ -25,7 +25,7 @@ use crate::output::frames_record::{
 };
 use crate::output::restore::{FoundModel, chain, exported_model, markers_at, robot_description};
 use crate::output::solution_json::SolutionRecord;
-use crate::output::work_findings::{from_below, other_frame};
+use crate::output::work_findings::{carried, from_below, other_frame};
 use crate::output::{ResultFolder, folder_name, plan_files, touch_plan};
 use crate::problem::MeasuredSeries;
 use crate::series::{self, InputFile, Series};
@@ -110,6 +110,7 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     findings.extend(mirrored.map(|joints| mirror_image_fits(&joints, &subject)));
     findings.extend(from_below(robot.exported(), (&fitted, &touches), &found.limits, &subject));
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
+    findings.extend(carried(robot.exported(), frames.work.as_ref().map(|w| w.name.as_str()), &subject));
     let robot_record = RobotOfFrames {
         solution: InputFile::of_file(&args.from)?,
         name: record.robot.name.clone(),
@@ -306,23 +307,28 @@ fn same_links(s: &Series, record: &SolutionRecord) -> Result<()> {
 }
 
 fn placement_named(record: &SolutionRecord, name: &str) -> Result<usize> {
-    let names: Vec<&str> = record.placements.iter().map(|p| p.name.as_str()).collect();
+    let in_base: Vec<usize> = (0..record.placements.len())
+        .filter(|&k| record.mount_of_placement(k) == Some(series::CameraMount::Hand))
+        .collect();
+    let names: Vec<&str> = in_base.iter().map(|&k| record.placements[k].name.as_str()).collect();
     let refuse = |what: String, remedy: String| Err(Error::new(Code::OptionRange, "--plate", what, remedy));
-    let hand = record.images.iter().any(|i| i.camera_mount == series::CameraMount::Hand && i.is_on_robot());
-    if names.is_empty() || !hand {
+    if names.is_empty() {
         let what = "the solution has no plate that stands in the base".to_owned();
         return refuse(what, "give touches of the work object with --touches".into());
     }
     match names.iter().position(|n| *n == name) {
-        Some(found) => Ok(found),
-        None if name.is_empty() && names.len() == 1 => Ok(0),
+        Some(found) => Ok(in_base[found]),
+        None if name.is_empty() && names.len() == 1 => Ok(in_base[0]),
         None if name.is_empty() => {
             refuse(format!("the plate stood at {} places", names.len()), format!("name one: {}", names.join(", ")))
         }
         None => {
             let meant =
                 closest_name(name, names.iter().copied()).map_or_else(String::new, |m| format!("is \"{m}\" meant? "));
-            refuse(format!("\"{name}\" is no placement"), format!("{meant}its placements are {}", names.join(", ")))
+            refuse(
+                format!("\"{name}\" is no placement in the base"),
+                format!("{meant}its placements are {}", names.join(", ")),
+            )
         }
     }
 }
@@ -468,4 +474,19 @@ fn in_the_base(frames: &Frames, record: &SolutionRecord, fit: &FrameFit) -> Fram
 fn corrected_urdf(record: &SolutionRecord, found: &FoundModel, frames: &Frames) -> Result<String> {
     let origins = found.robot.urdf_origins().into_iter().map(|(joint, origin)| (joint.to_owned(), origin)).collect();
     frame_files::urdf(&patch_origins(&record.urdf.text, &origins)?, frames)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::placement_named;
+    use crate::error::Code;
+    use crate::output::solution_json::SolutionRecord;
+
+    #[test]
+    fn a_plate_on_the_tip_is_no_work_object() {
+        let record = SolutionRecord::with_both_mounts();
+        assert_eq!(placement_named(&record, "").unwrap(), 0);
+        assert_eq!(placement_named(&record, "placement_0").unwrap(), 0);
+        assert_eq!(placement_named(&record, "carried").unwrap_err().code, Code::OptionRange);
+    }
 }

@@ -47,3 +47,41 @@ pub fn from_below(
             .to_owned();
     (is_flat && is_below).then(|| FileFinding::new(Code::TouchedFromBelow, Weight::Note, subject, [], text))
 }
+
+/// The frame in which the work object is stated moves against the link that carries the robot.
+pub fn carried(robot: &Robot, work: Option<&str>, subject: &str) -> Option<FileFinding> {
+    let work = work.filter(|_| robot.chain.base_moves())?;
+    let base = &robot.chain.base;
+    let text = format!(
+        "{work} is stated in {base}, which joints of the robot move: it goes with {base}, as a work object on a positioner does. One that stands still is found by touches in a solution whose base stands still (identify --base)"
+    );
+    Some(FileFinding::new(Code::WorkCarried, Weight::Note, subject, [], text))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::carried;
+    use crate::error::Code;
+    use crate::model::robot::Robot;
+    use crate::urdf::RobotDescription;
+
+    #[test]
+    fn a_work_object_on_a_link_that_moves_is_carried() {
+        let joint = |name: &str, parent: &str, child: &str| {
+            format!(
+                r#"<link name="{child}"/><joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/><origin xyz="0.3 0 0.2"/>
+                <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="0" velocity="1"/></joint>"#
+            )
+        };
+        let arm = joint("a1", "foot", "upper") + &joint("a2", "upper", "tool") + &joint("turn", "foot", "table");
+        let text = format!(r#"<robot name="cell"><link name="foot"/>{arm}</robot>"#);
+        let cell = RobotDescription::from_text(Path::new("cell.urdf"), text).unwrap();
+        let robot = |base| Robot::nominal(cell.chain(Some(base), Some("tool")).unwrap());
+        let found = carried(&robot("table"), Some("work"), "solution.json").unwrap();
+        assert_eq!(found.code, Code::WorkCarried);
+        assert_eq!(carried(&robot("foot"), Some("work"), "solution.json"), None);
+        assert_eq!(carried(&robot("table"), None, "solution.json"), None);
+    }
+}

@@ -29,6 +29,7 @@ pub(super) fn text(frames: &Frames) -> String {
     }
     if let Some(work) = &frames.work {
         let (name, pose) = (variable("wobj", &work.name), frame(work));
+        text += &format!("  ! Work object in {}\n", frames.base);
         text += &format!("  PERS wobjdata {name}:=[FALSE,TRUE,\"\",{pose},[[0,0,0],[1,0,0,0]]];\n");
     }
     text + "ENDMODULE\n"
