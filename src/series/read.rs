@@ -166,12 +166,30 @@ fn views_of(series: &mut Series, use_observations: bool) -> Result<Vec<Series>> 
     )?;
     let Series { name, folder, manifest, stops, controller, .. } = &*series;
     let all = Seen { series: name, folder, manifest, stops, controller: controller.as_ref() };
+    let views = all.views(&rows);
+    if use_observations {
+        require_names_of_their_own(&path, &views)?;
+    }
     let mut inputs = Vec::new();
-    let views = all.views(&rows).into_iter().map(|view| one_view(series, &path, view, use_observations, &mut inputs));
+    let views = views.into_iter().map(|view| one_view(series, &path, view, use_observations, &mut inputs));
     let views = views.collect::<Result<Vec<_>>>()?;
     series.inputs.extend(inputs);
     series.inputs.dedup();
     Ok(views)
+}
+
+/// Observations name their image and no camera.
+fn require_names_of_their_own(table: &Path, views: &[CameraView]) -> Result<()> {
+    let mut names = BTreeSet::new();
+    let images = views.iter().flat_map(|view| &view.stops.stops);
+    match images.map(|stop| stop.image.as_str()).find(|name| !names.insert(*name)) {
+        Some(name) => {
+            let what = format!("\"{name}\" is an image of two cameras, which observations.csv does not tell apart");
+            let remedy = "give the images of every camera names of their own, here and in observations.csv";
+            Err(Error::new(Code::CsvRowTwice, table.display(), what, remedy))
+        }
+        None => Ok(()),
+    }
 }
 
 fn one_view(

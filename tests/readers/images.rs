@@ -110,3 +110,10 @@ fn what_is_said_of_readings_is_said_once_with_their_line() {
     // words: what is counted in images differs from view to view.
     assert!(said.place.contains("joints.csv:3") && !said.what.contains("images"), "{said:?}");
 }
+
+#[test]
+fn observations_name_images_of_one_camera_alone() {
+    let text = "image,marker,u,v\na.png,0,10,20\nb1.png,0,10,20\n";
+    let error = refusal("observations.csv", text);
+    assert_says(&error, Code::CsvRowTwice, &["images.csv", "\"a.png\""]);
+}
