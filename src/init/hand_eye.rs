@@ -8,7 +8,7 @@
 //! A. Li, L. Wang and D. Wu, "Simultaneous robot-world and hand-eye calibration using dual-quaternions and Kronecker product" (2010),
 //! the Kronecker variant.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
 use crate::geom::{Pose, log_so3, project_to_so3};
 use crate::linalg::median;
@@ -72,6 +72,31 @@ impl HandEye {
     pub fn median_error(&self, pairs: &[PosePair]) -> f64 {
         median(pairs.iter().map(|p| self.misfit(p))).unwrap_or(f64::INFINITY)
     }
+
+    /// No more than the misfit, and little less: the chord in the place of the angle.
+    fn least_misfit(&self, pair: &PosePair) -> f64 {
+        let (seen, carried) = (self.camera * pair.camera_from_plate, pair.chain * self.plate);
+        let chord = (seen.rotation - carried.rotation).norm() * std::f64::consts::FRAC_1_SQRT_2;
+        chord + (seen.translation - carried.translation).norm()
+    }
+
+    /// The median misfit where it is below `bound`; given up as soon as so many images miss by more that it cannot be.
+    fn median_error_below(&self, pairs: &[PosePair], bound: f64) -> Option<f64> {
+        let mut more = pairs.len() - pairs.len() / 2;
+        let mut misfits = Vec::with_capacity(pairs.len());
+        for pair in pairs {
+            let least = self.least_misfit(pair);
+            let misfit = if least < bound { self.misfit(pair) } else { least };
+            if misfit.total_cmp(&bound).is_ge() {
+                more -= 1;
+            }
+            if more == 0 {
+                return None;
+            }
+            misfits.push(misfit);
+        }
+        median(misfits)
+    }
 }
 
 /// Median misfit of the best closed form, rad plus m; infinite where none has a solution.
@@ -116,12 +141,10 @@ pub fn solve_hand_eye(pairs: &[PosePair]) -> Vec<HandEyeStart> {
         let mut best: Option<HandEye> = None;
         let mut best_error = f64::INFINITY;
         for sample in samples(pairs.len()) {
-            let chosen: Vec<PosePair> = sample.iter().map(|&i| pairs[i]).collect();
-            if let Some(solution) = shah(&chosen) {
-                let error = solution.median_error(pairs);
-                if error < best_error {
-                    (best, best_error) = (Some(solution), error);
-                }
+            let chosen = sample.map(|i| pairs[i]);
+            let Some(solution) = shah(&chosen) else { continue };
+            if let Some(error) = solution.median_error_below(pairs, best_error) {
+                (best, best_error) = (Some(solution), error);
             }
         }
         if let Some(solution) = best {
@@ -140,53 +163,50 @@ pub fn solve_hand_eye(pairs: &[PosePair]) -> Vec<HandEyeStart> {
 }
 
 /// Samples of image indices from a fixed linear congruential sequence, so that every run tries the same.
-fn samples(count: usize) -> Vec<Vec<usize>> {
+fn samples(count: usize) -> impl Iterator<Item = [usize; SAMPLE_SIZE]> {
     let mut seed: u64 = 0x9E37_79B9_7F4A_7C15;
-    let mut next = |bound: usize| {
+    let mut next = move |bound: usize| {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((seed >> 33) as usize) % bound
     };
-    (0..SAMPLES)
-        .map(|_| {
-            let mut order: Vec<usize> = (0..count).collect();
-            for k in 0..SAMPLE_SIZE {
-                let other = k + next(count - k);
-                order.swap(k, other);
-            }
-            order.truncate(SAMPLE_SIZE);
-            order
-        })
-        .collect()
+    let mut order: Vec<usize> = (0..count).collect();
+    (0..SAMPLES).map(move |_| {
+        let others: [usize; SAMPLE_SIZE] = std::array::from_fn(|k| k + next(count - k));
+        others.iter().enumerate().for_each(|(k, &other)| order.swap(k, other));
+        let sample = std::array::from_fn(|k| order[k]);
+        others.iter().enumerate().rev().for_each(|(k, &other)| order.swap(k, other));
+        sample
+    })
 }
 
-/// Translations of X and Z for given rotations: `R_X t_C + t_X = R_A t_Z + t_A`, linear.
+/// Translations of X and Z for given rotations.
 fn translations(pairs: &[PosePair], rx: Matrix3<f64>, rz: Matrix3<f64>) -> Option<HandEye> {
-    let mut n = DMatrix::<f64>::zeros(6, 6);
-    let mut b = DVector::<f64>::zeros(6);
-    for p in pairs {
-        let ra = p.chain.rotation;
-        let y = p.chain.translation - rx * p.camera_from_plate.translation;
-        // Unknowns t_X, t_Z with rows [I, -R_A].
-        for i in 0..3 {
-            n[(i, i)] += 1.0;
-            n[(3 + i, 3 + i)] += 1.0;
-            b[i] += y[i];
-            for j in 0..3 {
-                n[(i, 3 + j)] -= ra[(i, j)];
-                n[(3 + j, i)] -= ra[(i, j)];
-                b[3 + j] -= ra[(i, j)] * y[i];
-            }
-        }
-    }
+    let seen = pairs.iter().map(|p| (rx * p.camera_from_plate.translation, p.chain));
     // Directions that a sample leaves open (all rotations about one axis) stay near zero.
-    for i in 0..6 {
-        n[(i, i)] += 1e-9 * pairs.len() as f64;
+    let [camera, plate] = translations_by_rotations(seen, 1e-9 * pairs.len() as f64)?;
+    Some(HandEye { camera: Pose::new(rx, camera), plate: Pose::new(rz, plate) })
+}
+
+/// `t_X` and `t_Z` of `R_X t_C + t_X = R_A t_Z + t_A`, linear, from `R_X t_C` and A of every equation; `hold`, of one for each of them, keeps near zero
+/// what they do not tell.
+pub fn translations_by_rotations(
+    seen: impl Iterator<Item = (Vector3<f64>, Pose)>,
+    hold: f64,
+) -> Option<[Vector3<f64>; 2]> {
+    // Unknowns t_X, t_Z with rows [I, -R_A].
+    let (mut count, mut turns, mut rhs) = (hold, Matrix3::zeros(), Vector6::zeros());
+    for (turned, chain) in seen {
+        let y = chain.translation - turned;
+        count += 1.0;
+        turns -= chain.rotation;
+        let carried = -chain.rotation.tr_mul(&y);
+        rhs += Vector6::new(y.x, y.y, y.z, carried.x, carried.y, carried.z);
     }
-    let t = SymmetricFactor::new(&n).ok()?.solve(&b);
-    Some(HandEye {
-        camera: Pose::new(rx, Vector3::new(t[0], t[1], t[2])),
-        plate: Pose::new(rz, Vector3::new(t[3], t[4], t[5])),
-    })
+    let mut n = Matrix6::identity() * count;
+    n.fixed_view_mut::<3, 3>(0, 3).copy_from(&turns);
+    n.fixed_view_mut::<3, 3>(3, 0).copy_from(&turns.transpose());
+    let t = n.cholesky()?.solve(&rhs);
+    Some([t.fixed_rows::<3>(0).into_owned(), t.fixed_rows::<3>(3).into_owned()])
 }
 
 /// Share of the squares of the distances to the plate, at least, that the rotations of the stops leave to tell its scale: a hundredth of the
@@ -218,18 +238,36 @@ pub fn plate_scale(pairs: &[PosePair], solution: &HandEye) -> Option<f64> {
 /// X and Z by the Kronecker product (M. Shah 2013); `None` where there is no solution.
 pub fn shah(pairs: &[PosePair]) -> Option<HandEye> {
     // R_X = sum R_A R_Z R_C' in the least-squares sense: K = sum kron(R_C, R_A) maps vec(R_Z) to vec(R_X).
-    let mut k = DMatrix::<f64>::zeros(9, 9);
+    let mut k = SMatrix::<f64, 9, 9>::zeros();
     for p in pairs {
-        k += DMatrix::from_column_slice(9, 9, p.camera_from_plate.rotation.kronecker(&p.chain.rotation).as_slice());
+        k += p.camera_from_plate.rotation.kronecker(&p.chain.rotation);
     }
-    let (values, vectors) = symmetric_eigen(&(k.transpose() * &k))?;
-    let z = vectors.column(8).into_owned();
-    let x = &k * &z / values[8].max(0.0).sqrt();
-    let rotation = |v: &[f64]| {
-        let m = Matrix3::from_column_slice(v);
+    let z = longest_axis(k.tr_mul(&k))?;
+    let rotation = |v: SVector<f64, 9>| {
+        let m = Matrix3::from_column_slice(v.as_slice());
         project_to_so3(&(m * m.determinant().signum()))
     };
-    translations(pairs, rotation(x.as_slice())?, rotation(z.as_slice())?)
+    translations(pairs, rotation(k * z)?, rotation(z)?)
+}
+
+/// Squarings after which eigenvalues that differ by 1e-9 are told apart.
+const SQUARINGS: usize = 36;
+
+/// Eigenvector of the largest eigenvalue of a positive semidefinite matrix: squared again and again, with its trace at one, it becomes the
+/// projection on it.
+fn longest_axis(m: SMatrix<f64, 9, 9>) -> Option<SVector<f64, 9>> {
+    let unit = |m: SMatrix<f64, 9, 9>, trace: f64| (trace.is_finite() && trace > 0.0).then(|| m * trace.recip());
+    let mut power = unit(m, m.trace())?;
+    for _ in 0..SQUARINGS {
+        let squared = power * power;
+        // The sum of the squared eigenvalues, of which the sum is one.
+        let trace = squared.trace();
+        power = unit(squared, trace)?;
+        if 1.0 - trace < 1e-9 {
+            break;
+        }
+    }
+    power.column(power.diagonal().imax()).into_owned().try_normalize(0.0)
 }
 
 fn park_martin(pairs: &[PosePair]) -> Option<HandEye> {
@@ -316,6 +354,49 @@ mod tests {
         for (name, form) in CLOSED_FORMS {
             println!("{name}");
             assert_close(&form(&pairs).unwrap(), &truth, 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_longest_axis_is_that_of_the_largest_eigenvalue() {
+        for case in 0..20 {
+            // The two largest singular values differ by a share of 1e-1 to 1e-4.
+            let a =
+                SMatrix::<f64, 9, 9>::from_fn(|i, j| ((7 * i * i + 13 * j * j + 5 * i * j + 31 * case) as f64).sin());
+            let orthogonal = a.qr().q();
+            let near = 1.0 - 10f64.powi(-(case as i32 % 4) - 1);
+            let values = SVector::<f64, 9>::from_fn(|k, _| if k == 4 { 3.0 } else { 3.0 * near / (1 + k) as f64 });
+            let m = orthogonal * SMatrix::from_diagonal(&values.component_mul(&values)) * orthogonal.transpose();
+            let found = longest_axis(m).unwrap();
+            let along = found.dot(&orthogonal.column(4)).abs();
+            assert!((1.0 - along).abs() < 1e-14, "{case}: {along}");
+        }
+        assert_eq!(longest_axis(SMatrix::zeros()), None);
+        assert_eq!(longest_axis(SMatrix::from_element(f64::NAN)), None);
+    }
+
+    #[test]
+    fn a_median_is_given_up_only_where_it_is_not_below() {
+        let (truth, mut pairs) = world(9);
+        for k in 0..9 {
+            pairs[k].chain.translation.x += 0.01 * (k + 1) as f64;
+        }
+        for count in 1..=9 {
+            let some = &pairs[..count];
+            let all = truth.median_error(some);
+            for bound in [0.5 * all, all, all * (1.0 + 1e-9), f64::INFINITY] {
+                assert_eq!(truth.median_error_below(some, bound), (all < bound).then_some(all), "{count} {bound}");
+            }
+        }
+    }
+
+    #[test]
+    fn samples_are_of_different_images_and_every_run_tries_the_same() {
+        let all: Vec<_> = samples(7).collect();
+        assert_eq!(all.len(), SAMPLES);
+        assert_eq!(all, samples(7).collect::<Vec<_>>());
+        for sample in &all {
+            assert!((0..SAMPLE_SIZE).all(|k| sample[k] < 7 && !sample[..k].contains(&sample[k])), "{sample:?}");
         }
     }
 

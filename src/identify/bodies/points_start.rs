@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::geom::{Pose, project_to_so3};
 use crate::identify::mistakes::parts::ends_of_parts;
+use crate::init::translations_by_rotations;
 use crate::linalg::{SymmetricFactor, lower_median};
 use crate::problem::{Adjustment, BodyMeasurement};
 
@@ -188,17 +189,9 @@ fn alternating(points: &[PointAt], mut rotation: Matrix3<f64>) -> Placed {
 
 /// `t` and `b` for a rotation.
 fn translations(points: &[PointAt], rotation: &Matrix3<f64>) -> Option<Placed> {
-    let (mut n, mut rhs) = (DMatrix::identity(6, 6) * HOLD, DVector::zeros(6));
-    for (p, tip) in points {
-        let mut row = DMatrix::zeros(3, 6);
-        row.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
-        row.fixed_view_mut::<3, 3>(0, 3).copy_from(&-tip.rotation);
-        n += row.tr_mul(&row);
-        rhs += row.tr_mul(&(tip.translation - rotation * p));
-    }
-    let x = SymmetricFactor::new(&n).ok()?.solve(&rhs);
-    let part = |first: usize| x.fixed_rows::<3>(first).into_owned();
-    Some((Pose::new(*rotation, part(0)), Pose::new(Matrix3::identity(), part(3))))
+    let seen = points.iter().map(|(p, tip)| (rotation * p, *tip));
+    let [frame, body] = translations_by_rotations(seen, HOLD)?;
+    Some((Pose::new(*rotation, frame), Pose::new(Matrix3::identity(), body)))
 }
 
 /// The rotation that brings the points to where the tip carries the body (K. Arun, T. Huang, S. Blostein 1987).
