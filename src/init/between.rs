@@ -29,6 +29,8 @@ const TRIED_IMAGES: usize = 16;
 /// The best of them that are refined, and steps of each.
 const REFINED: usize = 12;
 const STEPS: usize = 25;
+/// Step that ends them, rad: far less than any start is asked for.
+const STANDING_RAD: f64 = 1e-9;
 /// Rounds of the translations, each with less weight for images that disagree.
 const ROUNDS: usize = 4;
 /// Share of the normal equations' diagonal that holds what the stops leave open.
@@ -93,10 +95,11 @@ fn median_angle(triples: &[PoseTriple], rotations: &Rotations) -> f64 {
 /// Gauss-Newton with weights for images that disagree.
 fn refined(triples: &[PoseTriple], mut rotations: Rotations) -> Rotations {
     for _ in 0..STEPS {
-        let bound = 2.0 * median_angle(triples, &rotations) + f64::EPSILON;
+        let angles: Vec<Vector3<f64>> = triples.iter().map(|t| angle(t, &rotations)).collect();
+        let usual = median(angles.iter().map(|r| r.norm())).unwrap_or(f64::INFINITY);
+        let bound = 2.0 * usual + f64::EPSILON;
         let (mut n, mut b) = (SMatrix::<f64, 9, 9>::zeros(), SVector::<f64, 9>::zeros());
-        for t in triples {
-            let r = angle(t, &rotations);
+        for (t, r) in triples.iter().zip(angles) {
             let weight = (bound / r.norm().max(f64::MIN_POSITIVE)).min(1.0);
             let mut j = SMatrix::<f64, 3, 9>::zeros();
             j.fixed_view_mut::<3, 3>(0, 0).copy_from(&t.camera_from_plate.rotation.transpose());
@@ -111,6 +114,9 @@ fn refined(triples: &[PoseTriple], mut rotations: Rotations) -> Rotations {
         for (k, r) in rotations.iter_mut().enumerate() {
             let moved = *r * exp_so3(&step.fixed_rows::<3>(3 * k).into_owned());
             *r = project_to_so3(&moved).unwrap_or(moved);
+        }
+        if step.amax() < STANDING_RAD {
+            break;
         }
     }
     rotations
