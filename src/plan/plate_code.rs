@@ -8,6 +8,8 @@
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::linalg::wide;
+
 /// Number of symbols; two bits in a packed window.
 pub const SYMBOLS: u8 = 4;
 /// Short side of the window in cells.
@@ -53,11 +55,12 @@ struct Reading {
     upright: bool,
 }
 
-/// Packed windows: the readings and their half-turned, mirrored and mirrored half-turned forms.
+/// Packed windows: as they are read, turned by a half, mirrored, and both.
+///
+/// A quarter turn needs no form of its own, since each window is read in the one orientation that makes it 4 x 5.
 struct Windows {
     readings: Vec<Reading>,
-    plain: Vec<[u64; 2]>,
-    mirrored: Vec<[u64; 2]>,
+    forms: [Vec<u64>; 4],
 }
 
 fn readings(columns: usize, rows: usize) -> Vec<Reading> {
@@ -89,37 +92,50 @@ fn pack(cells: impl Iterator<Item = u8>) -> u64 {
 }
 
 /// The window as read and turned by a half; then the same of its mirror image.
-fn forms(cells: &[u8; CELLS]) -> ([u64; 2], [u64; 2]) {
+fn forms(cells: &[u8; CELLS]) -> [u64; 4] {
     let mirror = |k: usize| cells[k / WINDOW_LONG * WINDOW_LONG + WINDOW_LONG - 1 - k % WINDOW_LONG];
-    let plain = [pack(cells.iter().copied()), pack(cells.iter().rev().copied())];
-    (plain, [pack((0..CELLS).map(mirror)), pack((0..CELLS).rev().map(mirror))])
+    let [plain, turned] = [pack(cells.iter().copied()), pack(cells.iter().rev().copied())];
+    [plain, turned, pack((0..CELLS).map(mirror)), pack((0..CELLS).rev().map(mirror))]
 }
 
 /// In how many cells two packed windows differ.
+#[inline(always)]
 fn distance(a: u64, b: u64) -> u32 {
     let different = a ^ b;
     ((different | different >> 1) & 0x5555_5555_5555_5555).count_ones()
 }
 
+/// How far a distance stays below `target`, squared.
+#[inline(always)]
+fn shortfall(distance: u32, target: u32) -> u64 {
+    let short = target.saturating_sub(distance);
+    u64::from(short * short)
+}
+
 impl Windows {
     fn new(symbols: &[u8], columns: usize, rows: usize) -> Self {
         let readings = readings(columns, rows);
-        let (plain, mirrored) = readings.iter().map(|&r| forms(&read(symbols, columns, r))).unzip();
-        Self { readings, plain, mirrored }
+        let mut windows = Self { forms: std::array::from_fn(|_| vec![0; readings.len()]), readings };
+        (0..windows.readings.len()).for_each(|k| windows.read(k, symbols, columns));
+        windows
+    }
+
+    /// Reads window `k` anew.
+    fn read(&mut self, k: usize, symbols: &[u8], columns: usize) {
+        let forms = forms(&read(symbols, columns, self.readings[k]));
+        self.forms.iter_mut().zip(forms).for_each(|(all, form)| all[k] = form);
     }
 
     /// Distances of window `i` to window `j`: both rotations, then both mirrored ones.
-    /// A quarter turn needs no form of its own, since each window is read in the one orientation that makes it 4 x 5.
-    fn distances(&self, form: u64, j: usize) -> [u32; 4] {
-        let ([a, b], [c, d]) = (self.plain[j], self.mirrored[j]);
-        [distance(form, a), distance(form, b), distance(form, c), distance(form, d)]
+    fn distances(&self, i: usize, j: usize) -> [u32; 4] {
+        std::array::from_fn(|f| distance(self.forms[0][i], self.forms[f][j]))
     }
 
     fn code_distance(&self) -> CodeDistance {
         let mut least = CodeDistance { rotated: CELLS as u32, mirrored: CELLS as u32 };
-        for i in 0..self.plain.len() {
-            for j in i..self.plain.len() {
-                let [same, turned, m, n] = self.distances(self.plain[i][0], j);
+        for i in 0..self.readings.len() {
+            for j in i..self.readings.len() {
+                let [same, turned, m, n] = self.distances(i, j);
                 let rotated = if i == j { turned } else { same.min(turned) };
                 least.rotated = least.rotated.min(rotated);
                 least.mirrored = least.mirrored.min(m).min(n);
@@ -130,30 +146,43 @@ impl Windows {
 
     /// Sum over pairs of how far the distance stays below `target`, squared; only pairs with a window in `touched`.
     fn penalty_of(&self, touched: &[usize], target: u32) -> u64 {
-        let mut is_touched = vec![false; self.plain.len()];
-        touched.iter().for_each(|&i| is_touched[i] = true);
-        let mut sum = 0;
-        for &i in touched {
-            for (j, &partner_touched) in is_touched.iter().enumerate() {
-                if partner_touched && j < i {
-                    continue;
+        let of_window = |(k, &i): (usize, &usize)| {
+            // Pairs of two of them count once.
+            let again: u64 = touched[..k].iter().map(|&j| self.pair_penalty(i, j, target)).sum();
+            self.window_penalty(i, 0, target) - again
+        };
+        touched.iter().enumerate().map(of_window).sum()
+    }
+
+    /// The same of the pairs of window `i` with all from `first` on, `i` among them.
+    fn window_penalty(&self, i: usize, first: usize, target: u32) -> u64 {
+        let form = self.forms[0][i];
+        let of_all = wide(
+            #[inline(always)]
+            || {
+                let mut sum = 0;
+                for windows in &self.forms {
+                    for &window in &windows[first..] {
+                        sum += shortfall(distance(form, window), target);
+                    }
                 }
-                sum += self.pair_penalty(i, j, target);
-            }
-        }
-        sum
+                sum
+            },
+        );
+        // As it is read, a window is no pair with itself.
+        of_all - shortfall(0, target)
     }
 
     fn pair_penalty(&self, i: usize, j: usize, target: u32) -> u64 {
         let skip = usize::from(i == j);
-        let short = |d: &u32| u64::from(target.saturating_sub(*d)).pow(2);
-        self.distances(self.plain[i][0], j).iter().skip(skip).map(short).sum()
+        self.distances(i, j).iter().skip(skip).map(|&d| shortfall(d, target)).sum()
     }
 
     /// All pairs of windows that are nearer than `target`.
     fn conflicts(&self, target: u32) -> Vec<(usize, usize)> {
-        let n = self.plain.len();
-        (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).filter(|&(i, j)| self.pair_penalty(i, j, target) > 0).collect()
+        let n = self.readings.len();
+        let near = (0..n).filter(|&i| self.window_penalty(i, i, target) > 0);
+        near.flat_map(|i| (i..n).map(move |j| (i, j))).filter(|&(i, j)| self.pair_penalty(i, j, target) > 0).collect()
     }
 }
 
@@ -179,9 +208,7 @@ impl Search {
     fn set(&mut self, cell: usize, symbol: u8) {
         self.symbols[cell] = symbol;
         for &k in &self.seen_by[cell] {
-            let (plain, mirrored) = forms(&read(&self.symbols, self.columns, self.windows.readings[k]));
-            self.windows.plain[k] = plain;
-            self.windows.mirrored[k] = mirrored;
+            self.windows.read(k, &self.symbols, self.columns);
         }
     }
 
@@ -289,6 +316,23 @@ mod tests {
             let symbols = (0..columns * rows).map(|_| rng.random_range(0..SYMBOLS)).collect();
             let code = PlateCode { columns, rows, symbols };
             assert_eq!(code.distance(), distance_by_tables(&code), "{columns} x {rows}");
+        }
+    }
+
+    #[test]
+    fn the_penalty_of_touched_windows_is_that_of_their_pairs() {
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let search = Search::new(9, 8, &mut rng);
+        let (windows, n) = (&search.windows, search.windows.readings.len());
+        for (cell, target) in [(0, 13), (17, 11), (40, 14), (71, 20)] {
+            let touched = &search.seen_by[cell];
+            let mut pairs = (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>();
+            let near: Vec<_> = pairs.iter().copied().filter(|&(i, j)| windows.pair_penalty(i, j, target) > 0).collect();
+            assert_eq!(windows.conflicts(target), near);
+            pairs.retain(|(i, j)| touched.contains(i) || touched.contains(j));
+            let sum: u64 = pairs.iter().map(|&(i, j)| windows.pair_penalty(i, j, target)).sum();
+            assert!(sum > 0);
+            assert_eq!(windows.penalty_of(touched, target), sum);
         }
     }
 
