@@ -154,32 +154,33 @@ fn the_urdf_of_a_carried_base_has_every_origin_where_it_belongs() {
 /// are shifted. The bases of two arms, found from wrong readings, are found anew for every mistake that is tried.
 #[test]
 fn mistakes_in_what_stands_beside_the_arm_are_named() {
-    let named = |cell: &Cell, change: &dyn Fn(&mut Vec<Vec<f64>>)| {
-        let mut series = measured(&world(&cell.actual, 4), &cell.known);
+    let named = |(cell, made): (&Cell, &MeasuredSeries), change: &dyn Fn(&mut Vec<Vec<f64>>)| {
+        let mut series = made.clone();
         let mut readings: Vec<Vec<f64>> = series.stops.iter().filter_map(|s| s.readings.clone()).collect();
         change(&mut readings);
         series.stops.iter_mut().zip(readings).for_each(|(stop, q)| stop.readings = Some(q));
         identify(cell.known.clone(), &[series], &Options::default()).unwrap_err()
     };
     for cell in &cells() {
+        let made = (cell, &measured(&world(&cell.actual, 4), &cell.known));
         let n = cell.known.readings.len();
         let beside = if cell.name == "rail" { 0..1 } else { 0..n - 6 };
         let names: Vec<&str> = cell.known.readings[beside.clone()].iter().map(String::as_str).collect();
-        let shifted = named(cell, &|rows| {
+        let shifted = named(made, &|rows| {
             let given = rows.clone();
             for (k, q) in rows.iter_mut().enumerate() {
                 q[beside.clone()].copy_from_slice(&given[(k + 1) % given.len()][beside.clone()]);
             }
         });
         assert_says(&shifted, Code::RowsShifted, &names);
-        let sign = named(cell, &|rows| rows.iter_mut().for_each(|q| q[n - 2] = -q[n - 2]));
+        let sign = named(made, &|rows| rows.iter_mut().for_each(|q| q[n - 2] = -q[n - 2]));
         assert_says(&sign, Code::JointSignWrong, &[cell.known.readings[n - 2].as_str()]);
         if cell.name == "rail" {
             for unit_m in [1e-3, 1e-2, 0.0254] {
-                let unit = named(cell, &|rows| rows.iter_mut().for_each(|q| q[0] /= unit_m));
+                let unit = named(made, &|rows| rows.iter_mut().for_each(|q| q[0] /= unit_m));
                 assert_eq!((unit.code, unit.place.as_str()), (Code::JointUnitWrong, names[0]), "{unit_m}: {unit}");
             }
-            let constant = named(cell, &|rows| rows.iter_mut().for_each(|q| q[0] = 0.0));
+            let constant = named(made, &|rows| rows.iter_mut().for_each(|q| q[0] = 0.0));
             assert_says(&constant, Code::LinkLengthsWrong, &names);
         }
     }
