@@ -64,11 +64,11 @@ fn to_enter(files: &Files) -> Vec<f64> {
 fn the_urdf_for_those_who_read_nothing_else_is_a_file_of_its_own() {
     let description = robot();
     let name = "kuka_kr6_r900.calibrated_alone.urdf";
-    let rigid = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let rigid = solved(CameraMount::Hand, RobotModel::Rigid);
     assert!(rigid.uncertainty.alone.is_none());
     assert!(!files(&rigid, &context(&description)).unwrap().contains_key(name));
 
-    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Full);
     let alone = solution.uncertainty.alone.as_ref().unwrap();
     let mut mastering = context(&description);
     mastering.offsets = Offsets::Mastering;
@@ -111,8 +111,8 @@ fn an_offset_that_was_held_is_not_determined() {
 }
 
 /// With offsets of every size, of joints that are determined and of those that are not.
-fn solved_with_offsets(model: RobotModel, description: &RobotDescription) -> Solution {
-    let mut solution = solved(CameraMount::Hand, model, description);
+fn solved_with_offsets(model: RobotModel) -> Solution {
+    let mut solution = solved(CameraMount::Hand, model);
     for t in solution.fit.state.robot.terms.iter_mut().filter(|t| t.term == Term::Offset) {
         t.value += 1e-3 * (t.reading as f64 + 1.0);
     }
@@ -122,7 +122,7 @@ fn solved_with_offsets(model: RobotModel, description: &RobotDescription) -> Sol
 #[test]
 fn offsets_in_the_controller_or_in_the_origins_are_the_same_robot() {
     let description = robot();
-    let solution = solved_with_offsets(RobotModel::Full, &description);
+    let solution = solved_with_offsets(RobotModel::Full);
     let folded = files(&solution, &context(&description)).unwrap();
     let mut mastering = context(&description);
     mastering.offsets = Offsets::Mastering;
@@ -159,7 +159,7 @@ fn offsets_in_the_controller_or_in_the_origins_are_the_same_robot() {
 #[test]
 fn a_controller_that_took_the_determined_offsets_has_the_robot_that_was_found() {
     let description = robot();
-    let solution = solved_with_offsets(RobotModel::Rigid, &description);
+    let solution = solved_with_offsets(RobotModel::Rigid);
     let readings = description.chain(None, None).unwrap().readings.len();
     let mut mastering = context(&description);
     mastering.offsets = Offsets::Mastering;
@@ -189,7 +189,7 @@ fn a_controller_that_took_the_determined_offsets_has_the_robot_that_was_found() 
 #[test]
 fn commands_take_the_exported_robot_of_a_mastered_solution() {
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid);
     let mut mastering = context(&description);
     mastering.offsets = Offsets::Mastering;
     let files = files(&solution, &mastering).unwrap();
@@ -224,7 +224,7 @@ const PROGRAM: &str = "DEF P()\nPTP {A1 5, A2 -80, A3 100, A4 10, A5 40, A6 0}\n
 #[test]
 fn xacro_properties_are_the_origins_of_the_urdf() {
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid);
     let files = files(&solution, &context(&description)).unwrap();
     let chain = reread(&files).chain;
     let xacro = text(&files, "kinematics.xacro");
@@ -533,7 +533,7 @@ fn what_is_stated_of_the_flange_is_what_the_exported_files_give() {
 #[test]
 fn mdh_parameters_say_what_they_leave() {
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid);
     let files = files(&solution, &context(&description)).unwrap();
     let real = Robot::nominal(reread(&files).chain);
     let mdh = text(&files, "mdh.csv");

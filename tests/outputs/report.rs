@@ -1,6 +1,7 @@
 //! The report: complete, self-contained, and safe against whatever stands in names.
 
 use std::process::Command;
+use std::sync::OnceLock;
 
 use crate::outputs_support::{context, robot, solved};
 use robotcal::diagnose::{DoubtedSize, ExchangedReadings, Finding, OddImage, SmallGain, ToldBy, Weight};
@@ -12,14 +13,19 @@ use robotcal::series::{CameraMount, InputFile};
 use serde_json::json;
 
 fn record() -> solution_json::SolutionRecord {
-    let description = robot();
-    let mut solution = solved(CameraMount::Hand, RobotModel::Full, &description);
-    solution.two_stage = beside_two_stages(&solution);
-    let files = files(&solution, &context(&description)).unwrap();
-    let record = solution_json::read(&files["solution.json"]).unwrap();
-    // The page is made from the record alone: what it says is in solution.json.
-    assert_eq!(report_html(&record, &Thumbnails::default()).as_bytes(), files["report.html"]);
-    record
+    static WRITTEN: OnceLock<Vec<u8>> = OnceLock::new();
+    let written = WRITTEN.get_or_init(|| {
+        let description = robot();
+        let mut solution = solved(CameraMount::Hand, RobotModel::Full);
+        solution.two_stage = beside_two_stages(&solution);
+        let mut files = files(&solution, &context(&description)).unwrap();
+        let written = files.remove("solution.json").unwrap();
+        // The page is made from the record alone: what it says is in solution.json.
+        let record = solution_json::read(&written).unwrap();
+        assert_eq!(report_html(&record, &Thumbnails::default()).as_bytes(), files["report.html"]);
+        written
+    });
+    solution_json::read(written).unwrap()
 }
 
 /// The outermost `<svg>` elements of a page.

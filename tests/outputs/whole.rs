@@ -66,7 +66,7 @@ pub(super) fn reread_chain(files: &Files) -> robotcal::urdf::Chain {
 #[test]
 fn kinematics_of_the_reread_urdf_are_those_of_the_rigid_model() {
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Full);
     let files = files(&solution, &context(&description)).unwrap();
     let reread = Robot::nominal(reread_chain(&files));
     let mut rigid = solution.fit.state.robot.clone();
@@ -93,7 +93,7 @@ fn kinematics_yaml_says_the_same_as_the_urdf_that_it_belongs_to() {
     }
     let description = robot();
     let origins = |model: RobotModel, mark: &str| {
-        let files = files(&solved(CameraMount::Hand, model, &description), &context(&description)).unwrap();
+        let files = files(&solved(CameraMount::Hand, model), &context(&description)).unwrap();
         let yaml: BTreeMap<String, BTreeMap<String, Origin>> =
             serde_saphyr::from_str(text(&files, &format!("kinematics{mark}.yaml"))).unwrap();
         let chain = chain_of(text(&files, &format!("kuka_kr6_r900.calibrated{mark}.urdf")));
@@ -136,7 +136,7 @@ fn published(files: &Files, name: &str) -> (String, String, Pose) {
 fn files_chained_by_their_frames_give_the_camera_pose_of_the_solver() {
     for mount in [CameraMount::Hand, CameraMount::Fixed] {
         let description = robot();
-        let solution = solved(mount, RobotModel::Rigid, &description);
+        let solution = solved(mount, RobotModel::Rigid);
         let files = files(&solution, &context(&description)).unwrap();
         let (camera, plate) = (PoseYaml::read(&files, "hand_camera.yaml"), PoseYaml::read(&files, "plate_pose.yaml"));
         for pose in [&camera, &plate] {
@@ -193,7 +193,7 @@ fn camera_yaml_is_a_ros_camera_info() {
         projection_matrix: Matrix,
     }
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid);
     let files = files(&solution, &context(&description)).unwrap();
     let info: CameraInfo = serde_saphyr::from_str(text(&files, "camera.yaml")).unwrap();
     assert_eq!((info.image_width, info.image_height, info.camera_name.as_str()), (1280, 1024, "front"));
@@ -223,7 +223,7 @@ fn camera_yaml_is_a_ros_camera_info() {
 #[test]
 fn the_corrected_plate_is_a_plate() {
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid);
     let files = files(&solution, &context(&description)).unwrap();
     let folder = tempfile::tempdir().unwrap();
     for name in ["plate.toml", "plate.csv"] {
@@ -263,7 +263,7 @@ fn compensation_has_every_term_but_the_offset() {
         joint: BTreeMap<String, Joint>,
     }
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Full);
     let files = files(&solution, &context(&description)).unwrap();
     let read: Compensation = toml::from_str(text(&files, "compensation.toml")).unwrap();
     let robot = &solution.fit.state.robot;
@@ -289,7 +289,7 @@ fn compensation_has_every_term_but_the_offset() {
         let (angle, distance) = Pose::from_xyz_rpy([x, y, z], [roll, pitch, yaw]).distance(&joint.origin);
         assert!(angle < 1e-12 && distance < 1e-15, "{}: {angle:e} {distance:e}", joint.name);
     }
-    let rigid = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let rigid = solved(CameraMount::Hand, RobotModel::Rigid);
     let rigid = robotcal::output::files(&rigid, &context(&description)).unwrap();
     let none: Compensation = toml::from_str(text(&rigid, "compensation.toml")).unwrap();
     assert!(none.joint.is_empty() && none.urdf.is_empty());
@@ -298,7 +298,7 @@ fn compensation_has_every_term_but_the_offset() {
 #[test]
 fn observations_csv_has_all_observations_with_reasons_and_is_a_series_input() {
     let description = robot();
-    let mut solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let mut solution = solved(CameraMount::Hand, RobotModel::Rigid);
     solution.fit.problem.images[3].rejected = Some(ImageRejection::Duplicate { of: "an image, \"really\"".into() });
     solution.fit.problem.images[5].observations[2].rejected = Some(ObservationRejection::Residual);
     let files = files(&solution, &context(&description)).unwrap();
@@ -333,7 +333,7 @@ fn observations_csv_has_all_observations_with_reasons_and_is_a_series_input() {
 #[test]
 fn solution_json_reads_back_with_everything_in_it() {
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Full, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Full);
     let files = files(&solution, &context(&description)).unwrap();
     let record = solution_json::read(&files["solution.json"]).unwrap();
     assert_eq!(record.files, files.keys().cloned().collect::<Vec<_>>());
@@ -407,7 +407,7 @@ fn wrong_ones(value: &Value) -> Vec<Value> {
 #[test]
 fn a_solution_that_contradicts_itself_is_refused_when_it_is_read() {
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid);
     let files = files(&solution, &context(&description)).unwrap();
     let mut whole: Value = serde_json::from_slice(&files["solution.json"]).unwrap();
     // Two images tell as much as all, and are read sooner.
@@ -443,7 +443,7 @@ fn a_solution_that_contradicts_itself_is_refused_when_it_is_read() {
 #[test]
 fn nothing_names_a_folder_of_the_machine() {
     let description = robot();
-    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &description);
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid);
     let files = files(&solution, &context(&description)).unwrap();
     let named: Vec<PathBuf> = files.keys().map(PathBuf::from).collect();
     assert!(named.iter().all(|n| n.components().count() == 1));
@@ -457,7 +457,7 @@ fn show_brings_back_the_result_that_a_killed_run_moved_away() {
     let root = tempfile::tempdir().unwrap();
     let (out, old) = (root.path().join("run1"), root.path().join(".run1.old-4711-0"));
     let robot = robot();
-    let made = files(&solved(CameraMount::Hand, RobotModel::Rigid, &robot), &context(&robot)).unwrap();
+    let made = files(&solved(CameraMount::Hand, RobotModel::Rigid), &context(&robot)).unwrap();
     robotcal::output::write_all(&out, &made).unwrap();
     let show = || {
         let file = out.join("solution.json");

@@ -4,6 +4,7 @@
 pub mod truth_frame;
 
 use std::path::Path;
+use std::sync::{Mutex, OnceLock};
 
 use crate::robots::kr6_urdf;
 use nalgebra::{Vector2, Vector3, Vector6};
@@ -192,8 +193,23 @@ fn series_where(
     }
 }
 
+/// The solution of [`series`], found once for all tests.
 #[allow(dead_code)]
-pub fn solved(mount: CameraMount, model: RobotModel, description: &RobotDescription) -> Solution {
-    let chain = description.chain(None, None).unwrap();
-    identify(chain, &[series(mount, description)], &Options { model, ..Options::default() }).unwrap()
+pub fn solved(mount: CameraMount, model: RobotModel) -> Solution {
+    type Found = ((CameraMount, RobotModel), &'static OnceLock<Solution>);
+    static ALL: Mutex<Vec<Found>> = Mutex::new(Vec::new());
+    let own = {
+        let mut all = ALL.lock().unwrap();
+        let known = all.iter().find(|(of, _)| *of == (mount, model)).map(|(_, found)| *found);
+        known.unwrap_or_else(|| {
+            all.push(((mount, model), Box::leak(Box::default())));
+            all[all.len() - 1].1
+        })
+    };
+    let find = || {
+        let description = robot();
+        let chain = description.chain(None, None).unwrap();
+        identify(chain, &[series(mount, &description)], &Options { model, ..Options::default() }).unwrap()
+    };
+    own.get_or_init(find).clone()
 }

@@ -174,7 +174,7 @@ fn record_of(solution: &Solution) -> solution_json::SolutionRecord {
 
 #[test]
 fn solution_json_alone_gives_the_same_solution_again() {
-    let solution = solved(CameraMount::Hand, RobotModel::Rigid, &robot());
+    let solution = solved(CameraMount::Hand, RobotModel::Rigid);
     let record = record_of(&solution);
     let chain = robot_description(&record).unwrap().chain(Some(&record.robot.base), Some(&record.robot.tip)).unwrap();
     let series = measured_series(&record).unwrap();
@@ -200,7 +200,7 @@ fn solution_json_alone_gives_the_same_solution_again() {
 #[test]
 fn the_flange_scatters_as_its_covariance_says() {
     const DRAWS: usize = 400;
-    let record = record_of(&solved(CameraMount::Hand, RobotModel::Rigid, &robot()));
+    let record = record_of(&solved(CameraMount::Hand, RobotModel::Rigid));
     let model = found_model(&record).unwrap();
     let flange = model.flange().unwrap();
     let (still, column) = model.still.unwrap();
