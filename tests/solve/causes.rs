@@ -12,6 +12,7 @@ use robotcal::study::measured;
 use robotcal::urdf::Chain;
 use robotcal::{Code, Error};
 use std::path::Path;
+use std::sync::LazyLock;
 
 use crate::cameras;
 use crate::support::displaced::change;
@@ -29,7 +30,8 @@ fn corners() -> Plate {
 }
 
 fn circles() -> Plate {
-    design(&PlateRequest::default()).unwrap().plate
+    static PLATE: LazyLock<Plate> = LazyLock::new(|| design(&PlateRequest::default()).unwrap().plate);
+    PLATE.clone()
 }
 
 fn seen(urdf: &str, plate: Plate, seed: u64) -> (Chain, SimulatedSeries) {
