@@ -37,6 +37,11 @@ const OFF: f64 = 0.5;
 /// Times that sides are measured again between the corners that they have.
 const MOST_AGAIN: usize = 4;
 
+/// A corner with its covariance (uu, uv, vv), px^2.
+type Corner = ([f64; 2], [f64; 3]);
+/// A corner, or why there is none.
+type Crossing = std::result::Result<Corner, &'static str>;
+type Crossings = [Crossing; 4];
 /// Corners of tags by their place on the plate, counter-clockwise from the bottom-left.
 type Found = BTreeMap<usize, Quad>;
 /// Sides of tags by their place on the plate: bottom, right, top, left as printed.
@@ -230,10 +235,9 @@ impl<'a> Board<'a> {
         for (place, four) in &sides {
             let id = self.number(*place);
             let growth = of_place(place);
-            let [bottom, right, top, left] = four.map(|side| Ok(side?.shrunk(growth.px, growth.variance)));
-            let crossings = [(left, bottom), (bottom, right), (right, top), (top, left)];
-            for ((k, (a, b)), start) in (0..).zip(crossings).zip(found[place]) {
-                match crossing(a, b, start) {
+            let four = four.map(|side| Ok(side?.shrunk(growth.px, growth.variance)));
+            for ((k, corner), start) in (0..).zip(crossings(&four, &found[place])).zip(found[place]) {
+                match corner {
                     Ok((uv, covariance)) => {
                         let (marker, covariance) = (4 * id + k, Some(covariance));
                         detection.observations.push(Observation { marker, edge: Edge::Outer, uv, covariance });
@@ -271,8 +275,8 @@ impl<'a> Board<'a> {
     fn sides(&self, place: usize, corners: &Quad) -> [Measured; 4] {
         let (mut corners, mut sides) = (*corners, self.sides_from(place, corners));
         for again in 0..MOST_AGAIN {
-            let found = [0, 1, 2, 3]
-                .map(|k: usize| crossing(sides[(k + 3) % 4], sides[k], corners[k]).map_or(corners[k], |(uv, _)| uv));
+            let measured = crossings(&sides, &corners);
+            let found = [0, 1, 2, 3].map(|k: usize| measured[k].map_or(corners[k], |(uv, _)| uv));
             let is_elsewhere = (0..4).any(|k| distance(found[k], corners[k]) > ENDS_SPARE_PX);
             let is_lit = again == 0 && sides.iter().flatten().any(EdgeLine::is_lit);
             if !is_elsewhere && !is_lit {
@@ -313,25 +317,28 @@ impl<'a> Board<'a> {
         if self.tags.print == TagPrint::Kalibr {
             return self.grown_beside_squares(found, sides);
         }
-        let of_code = |(place, four): (&usize, &[Measured; 4]), rough: Option<f64>| {
-            let corner = |k: usize| {
-                let rough = rough.map(|px| (found[place][k], [px * px, 0.0, px * px]));
-                crossing(four[(k + 3) % 4], four[k], found[place][k]).ok().or(rough)
+        let tags: Vec<(usize, Crossings)> =
+            sides.iter().map(|(place, four)| (*place, crossings(four, &found[place]))).collect();
+        let of_code = |is_whole: bool| -> BTreeMap<usize, Growth> {
+            let alike = tags.iter().filter(|(_, corners)| corners.iter().all(|c| c.is_ok()) == is_whole);
+            let grown = |(place, corners): &(usize, Crossings)| {
+                let rough = |k: usize| (found[place][k], [ENDS_SPARE_PX.powi(2), 0.0, ENDS_SPARE_PX.powi(2)]);
+                let corners = [0, 1, 2, 3].map(|k| corners[k].unwrap_or(rough(k)));
+                Some((*place, self.grown_of_code(*place, &corners, &sides[place])?))
             };
-            let corners = [corner(0)?, corner(1)?, corner(2)?, corner(3)?];
-            let contrast = median(four.iter().flatten().map(EdgeLine::contrast))?;
-            let variance = corners.iter().map(|(_, c)| c[0] + c[2]).sum::<f64>() / 8.0;
-            let printed = self.print_of(*place);
-            let tag =
-                Outlined { printed: &printed, corners: corners.map(|(uv, _)| uv), variance, contrast, sides: four };
-            Some((*place, tag.growth(self.picture, self.smoothing_px)?))
+            alike.filter_map(grown).collect()
         };
-        let whole: BTreeMap<usize, Growth> = sides.iter().filter_map(|tag| of_code(tag, None)).collect();
-        if whole.is_empty() {
-            sides.iter().filter_map(|tag| of_code(tag, Some(ENDS_SPARE_PX))).collect()
-        } else {
-            whole
-        }
+        let whole = of_code(true);
+        if whole.is_empty() { of_code(false) } else { whole }
+    }
+
+    /// What the code of a tag says, whose corners have these covariances.
+    fn grown_of_code(&self, place: usize, corners: &[Corner; 4], sides: &[Measured; 4]) -> Option<Growth> {
+        let contrast = median(sides.iter().flatten().map(EdgeLine::contrast))?;
+        let variance = corners.iter().map(|(_, c)| c[0] + c[2]).sum::<f64>() / 8.0;
+        let printed = self.print_of(place);
+        let tag = Outlined { printed: &printed, corners: corners.map(|(uv, _)| uv), variance, contrast, sides };
+        tag.growth(self.picture, self.smoothing_px)
     }
 
     /// Where a side of a tag of an AprilGrid ends, the side of a dark square goes on with its ink on the other side, so that what moves both
@@ -391,8 +398,13 @@ fn whole(observations: &[Observation]) -> Tagged {
 }
 
 /// Where two sides cross, with the covariance.
-fn crossing(a: Measured, b: Measured, start: [f64; 2]) -> std::result::Result<([f64; 2], [f64; 3]), &'static str> {
+fn crossing(a: Measured, b: Measured, start: [f64; 2]) -> Crossing {
     a?.crossing(&b?, start).ok_or("no crossing of two sides")
+}
+
+/// The corners of a tag, from its bottom-left.
+fn crossings(sides: &[Measured; 4], starts: &Quad) -> Crossings {
+    [0, 1, 2, 3].map(|k: usize| crossing(sides[(k + 3) % 4], sides[k], starts[k]))
 }
 
 /// From the order as printed to clockwise on the screen.
