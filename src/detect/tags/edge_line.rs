@@ -21,6 +21,7 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
+use super::edge_shape::PixelShape;
 use crate::detect::Picture;
 use crate::detect::circles::normal_tail;
 use crate::detect::shared::{SATURATED, SYSTEMATIC_PX};
@@ -69,11 +70,6 @@ const NEARLY_AT_REST_PX: f64 = 5e-3;
 const LEVEL: f64 = 0.3;
 /// The same of the step to paper that is clipped: it is seen as the least that it may be.
 const CLIPPED_LEVEL: f64 = 1.0;
-/// What an edge of another shape leaves, as a share of the step: the area of a pixel at a blur of 0.3 px. It is alike all along a side, where it says
-/// so many numbers. Where all of the edge is seen it moves a side by less than print and lens do; where paper is clipped, half of the step is an
-/// extrapolation.
-const OTHER_SHAPE: f64 = 0.005;
-const OF_AN_EDGE: f64 = 8.0;
 /// Prior sigma of a slope of the light along the side, as a share of the contrast per px; it may change by itself over the side.
 const SLOPE_PER_PX: f64 = 0.01;
 /// What lies beyond ink and paper is seen so many blurs before it: at two by 2 % of the contrast.
@@ -220,7 +216,8 @@ impl EdgeLine {
             } else if around.is_some() || state[BLUR].exp() > SHINES_THROUGH * side.ink_px {
                 line.lighten(&mut pixels, around.get_or_insert_with(&beside), state[BLUR].exp());
             }
-            line.fit = iterate(picture, &pixels, length, &mut state)?;
+            let shape = PixelShape::of(&line.across, pixels.iter().any(|p| p.saturated));
+            line.fit = iterate(picture, &pixels, (length, shape), &mut state)?;
             let is_lit = around.as_ref().is_some_and(|around| !around.is_empty());
             line.fit.is_lit = is_lit;
             let moved = state - before;
@@ -412,7 +409,12 @@ fn bent_by_areas(pixels: &[Pixel], [dark, step]: [f64; 2]) -> [f64; 2] {
 }
 
 /// Gauss-Newton steps to the end.
-fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column) -> Result<Fit, &'static str> {
+fn iterate(
+    picture: &Picture,
+    pixels: &[Pixel],
+    (length, shape): (f64, PixelShape),
+    state: &mut Column,
+) -> Result<Fit, &'static str> {
     let mut noise = 0.03 * state[STEP];
     let farthest = (FARTHEST * length).max(FARTHEST_PX);
     let first = *state;
@@ -431,7 +433,8 @@ fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column)
         (DARK + 2, 0.0, slope / (2.0 * length)),
     ];
     for round in 1..=MOST_STEPS {
-        let Sums { mut normal, mut gradient, square, used, paper } = sums(pixels, state, picture.full_scale);
+        let Sums { mut normal, mut gradient, by_k, square, used, paper } =
+            sums(pixels, state, shape, picture.full_scale);
         if used < 2 * FEW_PARAMETERS {
             return Err("saturated");
         }
@@ -460,9 +463,9 @@ fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column)
         if moved_px(&step, length)[0] < rest {
             let (contrast, paper_residual) = (state[STEP], (paper.0 / paper.1.max(1.0)).sqrt());
             let mut covariance = factor.inverse().fixed_view::<SHAPE, SHAPE>(0, 0).into_owned();
-            if used < pixels.len() {
-                let of_shape = (OTHER_SHAPE * contrast / noise).powi(2) * used as f64 / OF_AN_EDGE;
-                covariance[(0, 0)] *= 1.0 + of_shape;
+            if !shape.is_nothing() {
+                let response = factor.solve(&(by_k * information)).fixed_rows::<SHAPE>(0).into_owned();
+                covariance += response * response.transpose() * shape.variance(blur);
             }
             let fit = Fit {
                 covariance,
@@ -482,14 +485,17 @@ fn iterate(picture: &Picture, pixels: &[Pixel], length: f64, state: &mut Column)
 struct Sums {
     normal: Normal,
     gradient: Column,
+    /// Products with the derivative by the shape of the edge.
+    by_k: Column,
     square: f64,
     used: usize,
     /// Squares of the residuals on the paper, and their number.
     paper: (f64, f64),
 }
 
-fn sums(pixels: &[Pixel], state: &Column, full_scale: f32) -> Sums {
-    let mut out = Sums { normal: Normal::zeros(), gradient: Column::zeros(), square: 0.0, used: 0, paper: (0.0, 0.0) };
+fn sums(pixels: &[Pixel], state: &Column, shape: PixelShape, full_scale: f32) -> Sums {
+    let (normal, zeros) = (Normal::zeros(), Column::zeros());
+    let mut out = Sums { normal, gradient: zeros, by_k: zeros, square: 0.0, used: 0, paper: (0.0, 0.0) };
     let blur = state[BLUR].exp();
     let limit = f64::from(SATURATED * full_scale);
     for p in pixels {
@@ -498,20 +504,23 @@ fn sums(pixels: &[Pixel], state: &Column, full_scale: f32) -> Sums {
         let (step, dark) =
             (state[STEP] + state[STEP + 1] * p.x, state[DARK] + p.x * (state[DARK + 1] + p.x * state[DARK + 2]));
         let (tail, phi) = normal_tail(u as f32);
-        let share = 1.0 - f64::from(tail) + p.light;
+        let phi = f64::from(phi);
+        let added = (!shape.is_nothing()).then(|| shape.add(u, phi, blur));
+        let share = 1.0 - f64::from(tail) + p.light + added.map_or(0.0, |a| a.share);
         let value = dark + step * share;
         if p.saturated && value >= limit {
             continue; // says no more than that
         }
         let residual = p.value - value;
-        let density = step * f64::from(phi) / blur;
+        let density = step * (phi + added.map_or(0.0, |a| a.by_u)) / blur;
+        let by_blur = step * (added.map_or(0.0, |a| a.by_blur) - phi * u);
         let row = Column::from([
             -density,
             -density * terms[1],
             -density * terms[2],
             -density * terms[3],
             -density * terms[4],
-            -density * u * blur,
+            by_blur,
             share,
             share * p.x,
             1.0,
@@ -520,6 +529,9 @@ fn sums(pixels: &[Pixel], state: &Column, full_scale: f32) -> Sums {
         ]);
         out.normal += row * row.transpose();
         out.gradient += row * residual;
+        if let Some(added) = added {
+            out.by_k += row * (step * added.by_k);
+        }
         out.square += residual * residual;
         out.used += 1;
         if u > 0.0 {
