@@ -50,6 +50,8 @@ const MOST_LOOKS: usize = 5;
 /// encoded steps said up to 3 % more than those of the long sides.
 const UNLIKE_PX: f64 = 0.01;
 const UNLIKE_SHARE: f64 = 0.03;
+/// Growth that nothing tells, as a share of the blur: that of the light to the power of 1 / 2.2 for ink that reflects 3 to 6 % of the paper.
+const OF_ENCODING: f64 = 0.4;
 /// Square of the standard error of a median over that of a mean.
 const OF_MEDIAN: f64 = std::f64::consts::FRAC_PI_2;
 
@@ -62,6 +64,13 @@ pub struct Growth {
 }
 
 impl Growth {
+    /// Where nothing tells it, of edges of this blur in a picture that was smoothed with this sigma: that of light in proportion, no more than
+    /// an encoding makes.
+    pub fn untold(blur_px: f64, smoothing_px: f64) -> Self {
+        let square = (blur_px * blur_px - smoothing_px * smoothing_px).max(0.0);
+        Self { px: 0.0, variance: OF_ENCODING * OF_ENCODING * square }
+    }
+
     /// That of the outline of a tag, where its code says it.
     pub fn of_outline(self) -> Self {
         let unlike = UNLIKE_PX * UNLIKE_PX + (UNLIKE_SHARE * self.px).powi(2);

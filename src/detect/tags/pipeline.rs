@@ -227,8 +227,9 @@ impl<'a> Board<'a> {
         let sides: Sides = sides.into_iter().map(|(place, four)| (place, usual.undisturbed(four))).collect();
         let own = self.grown(found, &sides);
         let known = InPicture::of(&own.values().copied().collect::<Vec<_>>());
+        let blur_px = median(sides.values().flatten().flatten().map(EdgeLine::blur_px)).unwrap_or(0.0);
         let of_place = |place: &usize| match known.map(|known| known.with(own.get(place).copied())) {
-            None => Growth { px: 0.0, variance: 0.0 },
+            None => Growth::untold(blur_px, self.smoothing_px),
             Some(growth) if self.tags.print == TagPrint::Kalibr => growth,
             Some(growth) => growth.of_outline(),
         };
@@ -248,8 +249,7 @@ impl<'a> Board<'a> {
         }
         detection.observations.sort_by_key(|o| o.marker);
         // An encoding displaces an edge by less than its blur.
-        let blur = || median(sides.values().flatten().flatten().map(EdgeLine::blur_px));
-        if known.is_some() { 0.0 } else { blur().unwrap_or(0.0) }
+        if known.is_some() { 0.0 } else { blur_px }
     }
 
     /// Whether each outer line of tags shows one, or should be in view.
