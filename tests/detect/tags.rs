@@ -146,6 +146,43 @@ fn clipped_paper_moves_no_corner_of_an_aprilgrid() {
     assert!(tally.found as f64 >= 0.95 * tally.visible as f64 && tally.rms < 0.03, "{tally:?}");
 }
 
+/// Beside clipped paper a side is known from the foot of its edge, whose shape the area of a pixel makes where the lens is sharp.
+#[test]
+fn sharp_and_soft_sides_beside_clipped_paper_are_as_uncertain_as_stated() {
+    for blur_px in [0.22, 0.6, 1.0] {
+        let tally = run_views(ARUCO, 1.8, |rng| {
+            let distance_m = rng.random_range(0.5..0.8);
+            let mut view = View { distance_m, tilt_deg: rng.random_range(0.0..30.0), aim_m: [0.0; 2], ..view(rng) };
+            view.conditions.psf_sigma_px = blur_px;
+            view
+        });
+        assert_eq!(tally.wrong, 0, "{blur_px}");
+        assert!(tally.found as f64 >= 0.9 * tally.visible as f64, "{blur_px}: {tally:?}");
+        assert!((0.4..1.5).contains(&tally.normalised.powi(2)), "{blur_px}: {tally:?}");
+    }
+}
+
+/// Modules of three to five pixels: their edges tell no growth, and the outline alone does not tell it from an encoding of the light.
+#[test]
+fn small_tags_in_encoded_light_are_as_uncertain_as_stated() {
+    let dictionaries = ["DICT_5X5_100", "DICT_6X6_250", "DICT_APRILTAG_36h11"];
+    for (text, power) in dictionaries
+        .iter()
+        .flat_map(|name| [(ARUCO.replace("DICT_4X4_50", name), true), (ARUCO.replace("DICT_4X4_50", name), false)])
+    {
+        let small = |rng: &mut ChaCha8Rng| {
+            let distance_m = 0.04 * 1100.0 / rng.random_range(25.0..30.0);
+            let mut view = View { distance_m, tilt_deg: rng.random_range(0.0..15.0), aim_m: [0.0; 2], ..view(rng) };
+            view.conditions.psf_sigma_px = rng.random_range(0.4..0.8);
+            view
+        };
+        let tally = run_recorded(&text, 0.72, small, |picture| if power { encoded(picture) } else { picture });
+        assert_eq!(tally.wrong, 0, "{text}");
+        assert!(tally.found as f64 >= 0.7 * tally.visible as f64, "{text}: {tally:?}");
+        assert!(tally.normalised < 1.3, "{text}: {tally:?}");
+    }
+}
+
 /// A lens that bends sides of 350 px and more by up to 10 px: the line between two corners is no place to look for the whole side.
 #[test]
 fn sides_that_the_lens_bends_far_are_measured_to_their_ends() {
