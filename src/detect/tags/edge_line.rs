@@ -15,29 +15,20 @@
 //! else is free but for wide priors. The pixels are those of a band about the side: about the line between its ends at first, wider by
 //! what the lens may bend, and laid again until it lies about what was found.
 //!
-//! Glare adds the same to ink and paper: where it clips the paper, the curve of the ink says where half of the step is. The ends
+//! Glare adds the same to ink and paper: where it clips the paper, the curve of the ink says where half of the step is, and the area of
+//! the pixel is in the shape of the edge ([`super::edge_shape`]). The ends
 //! are left out, where the next side rounds the corner off. Two sides cross at the corner; its covariance is that of their
 //! `(o, a, c, c3, c4)` at the noise that the residuals show.
 
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use nalgebra::{Matrix2, SMatrix, Vector2};
 
 use super::edge_shape::PixelShape;
+use super::edge_sums::{
+    BLUR, Column, DARK, FAR_BLURS, FEW_PARAMETERS, Pixel, SHAPE, STEP, Shape, Sums, powers, skew, sums,
+};
 use crate::detect::Picture;
 use crate::detect::circles::normal_tail;
 use crate::detect::shared::{SATURATED, SYSTEMATIC_PX};
-
-/// Of a side: o, a, c, c3, c4.
-const SHAPE: usize = 5;
-/// Parameters: those of a side, ln s, h0, h1, d0, d1, d2.
-const PARAMETERS: usize = SHAPE + 6;
-/// Of these, `c3` and `c4` are known beforehand where pixels are few.
-const FEW_PARAMETERS: usize = PARAMETERS - 2;
-const BLUR: usize = SHAPE;
-const STEP: usize = SHAPE + 1;
-const DARK: usize = SHAPE + 3;
-type Normal = SMatrix<f64, PARAMETERS, PARAMETERS>;
-type Column = SVector<f64, PARAMETERS>;
-type Shape = SVector<f64, SHAPE>;
 
 /// Prior sigmas of the terms of second to fifth order of what the lens bends times the first to fourth power of the width of the picture: k1 =
 /// 0.3 half way to the corner gives 0.15; the square of such a k1, and a k2 of that size, at a focal length of 0.6 widths give the last two.
@@ -78,8 +69,6 @@ const CLEAR_OF_BLURS: f64 = 2.0;
 const SHINES_THROUGH: f64 = 0.18;
 /// Times that what lies beside a side is laid again.
 const MOST_ROUNDS: usize = 12;
-/// Beyond so many blurs an edge is over.
-const FAR_BLURS: f64 = 8.0;
 /// A side that moves further than this part of its length, or by more than this many px, is another edge.
 const FARTHEST: f64 = 0.1;
 const FARTHEST_PX: f64 = 3.0;
@@ -90,11 +79,6 @@ const WORST: f64 = 0.12;
 pub(super) fn bends(picture: &Picture) -> [f64; 4] {
     let width = picture.width.max(picture.height) as f64;
     [1, 2, 3, 4].map(|k| BENDS[k as usize - 1] / width.powi(k))
-}
-
-/// Powers of a place along a side.
-fn powers(x: f64) -> Shape {
-    Shape::from([1.0, x, x * x, x.powi(3), x.powi(4)])
 }
 
 /// By how much a side of this length moves at most as a straight one, and by how much it is bent, px.
@@ -165,15 +149,7 @@ struct Fit {
     blur_px: f64,
     /// Whether what lies beside it is seen within.
     is_lit: bool,
-}
-
-struct Pixel {
-    x: f64,
-    y: f64,
-    value: f64,
-    saturated: bool,
-    /// Share of the step that comes from beside.
-    light: f64,
+    state: Column,
 }
 
 impl EdgeLine {
@@ -199,6 +175,7 @@ impl EdgeLine {
                 dark: 0.0,
                 blur_px: 0.0,
                 is_lit: false,
+                state: Column::zeros(),
             },
         };
         let mut state = Column::zeros();
@@ -243,6 +220,19 @@ impl EdgeLine {
     /// Whether what lies beside the side was seen within its ink.
     pub fn is_lit(&self) -> bool {
         self.fit.is_lit
+    }
+
+    /// How askew its edge is between ink and paper, as a share of the step, with the variance; `None` where paper is clipped.
+    pub fn skew(&self, picture: &Picture, side: &Side, beside: impl Fn() -> Vec<Beside>) -> Option<(f64, f64)> {
+        let (from, to) = (Vector2::from(side.from), Vector2::from(side.to));
+        let length = (to - from).norm();
+        let mut pixels = self.band(picture, side, length, [self.fit.blur_px, 0.0]).ok()?;
+        if self.fit.is_lit {
+            self.lighten(&mut pixels, &beside(), self.fit.blur_px);
+        }
+        let is_clipped = pixels.iter().any(|p| p.saturated);
+        let sigmas = prior_sigmas(bends(picture), length, &self.fit.state, is_clipped);
+        if is_clipped { None } else { skew(&pixels, &self.fit.state, &sigmas) }
     }
 
     /// The side when its covariance is so many times as large.
@@ -408,6 +398,28 @@ fn bent_by_areas(pixels: &[Pixel], [dark, step]: [f64; 2]) -> [f64; 2] {
     [mean - bend * half * half / 3.0, bend]
 }
 
+/// Prior sigmas of parameters, of a side that begins with these.
+fn prior_sigmas(
+    [second, third, fourth, _]: [f64; 4],
+    length: f64,
+    first: &Column,
+    is_clipped: bool,
+) -> [(usize, f64); 9] {
+    let (level, slope) = (LEVEL * first[STEP], SLOPE_PER_PX * first[STEP]);
+    let part = (first[2].abs() / second).clamp(LEAST_BENT, 1.0);
+    [
+        (2, second),
+        (3, part * third),
+        (4, part * fourth),
+        (BLUR, BLUR_SIGMA),
+        (STEP, if is_clipped { CLIPPED_LEVEL * first[STEP] } else { level }),
+        (STEP + 1, slope),
+        (DARK, level),
+        (DARK + 1, slope),
+        (DARK + 2, slope / (2.0 * length)),
+    ]
+}
+
 /// Gauss-Newton steps to the end.
 fn iterate(
     picture: &Picture,
@@ -418,20 +430,8 @@ fn iterate(
     let mut noise = 0.03 * state[STEP];
     let farthest = (FARTHEST * length).max(FARTHEST_PX);
     let first = *state;
-    let (level, slope) = (LEVEL * first[STEP], SLOPE_PER_PX * first[STEP]);
-    let [second, third, fourth, _] = bends(picture);
-    let part = (first[2].abs() / second).clamp(LEAST_BENT, 1.0);
-    let priors = [
-        (2, 0.0, second),
-        (3, 0.0, part * third),
-        (4, 0.0, part * fourth),
-        (BLUR, USUAL_BLUR_PX.ln(), BLUR_SIGMA),
-        (STEP, first[STEP], if pixels.iter().any(|p| p.saturated) { CLIPPED_LEVEL * first[STEP] } else { level }),
-        (STEP + 1, 0.0, slope),
-        (DARK, first[DARK], level),
-        (DARK + 1, 0.0, slope),
-        (DARK + 2, 0.0, slope / (2.0 * length)),
-    ];
+    let is_clipped = pixels.iter().any(|p| p.saturated);
+    let sigmas = prior_sigmas(bends(picture), length, &first, is_clipped);
     for round in 1..=MOST_STEPS {
         let Sums { mut normal, mut gradient, by_k, square, used, paper } =
             sums(pixels, state, shape, picture.full_scale);
@@ -442,7 +442,12 @@ fn iterate(
         let information = 1.0 / (noise * noise);
         normal *= information;
         gradient *= information;
-        for (k, prior, sigma) in priors {
+        for (k, sigma) in sigmas {
+            let prior = match k {
+                BLUR => USUAL_BLUR_PX.ln(),
+                STEP | DARK => first[k],
+                _ => 0.0,
+            };
             normal[(k, k)] += 1.0 / (sigma * sigma);
             gradient[k] -= (state[k] - prior) / (sigma * sigma);
         }
@@ -475,68 +480,10 @@ fn iterate(
                 dark: state[DARK],
                 blur_px: blur,
                 is_lit: false,
+                state: *state,
             };
             return if noise < WORST * contrast { Ok(fit) } else { Err("disturbed surroundings") };
         }
     }
     Err("no convergence")
-}
-
-struct Sums {
-    normal: Normal,
-    gradient: Column,
-    /// Products with the derivative by the shape of the edge.
-    by_k: Column,
-    square: f64,
-    used: usize,
-    /// Squares of the residuals on the paper, and their number.
-    paper: (f64, f64),
-}
-
-fn sums(pixels: &[Pixel], state: &Column, shape: PixelShape, full_scale: f32) -> Sums {
-    let (normal, zeros) = (Normal::zeros(), Column::zeros());
-    let mut out = Sums { normal, gradient: zeros, by_k: zeros, square: 0.0, used: 0, paper: (0.0, 0.0) };
-    let blur = state[BLUR].exp();
-    let limit = f64::from(SATURATED * full_scale);
-    for p in pixels {
-        let terms = powers(p.x);
-        let u = ((p.y - state.fixed_rows::<SHAPE>(0).dot(&terms)) / blur).clamp(-FAR_BLURS, FAR_BLURS);
-        let (step, dark) =
-            (state[STEP] + state[STEP + 1] * p.x, state[DARK] + p.x * (state[DARK + 1] + p.x * state[DARK + 2]));
-        let (tail, phi) = normal_tail(u as f32);
-        let phi = f64::from(phi);
-        let added = (!shape.is_nothing()).then(|| shape.add(u, phi, blur));
-        let share = 1.0 - f64::from(tail) + p.light + added.map_or(0.0, |a| a.share);
-        let value = dark + step * share;
-        if p.saturated && value >= limit {
-            continue; // says no more than that
-        }
-        let residual = p.value - value;
-        let density = step * (phi + added.map_or(0.0, |a| a.by_u)) / blur;
-        let by_blur = step * (added.map_or(0.0, |a| a.by_blur) - phi * u);
-        let row = Column::from([
-            -density,
-            -density * terms[1],
-            -density * terms[2],
-            -density * terms[3],
-            -density * terms[4],
-            by_blur,
-            share,
-            share * p.x,
-            1.0,
-            p.x,
-            p.x * p.x,
-        ]);
-        out.normal += row * row.transpose();
-        out.gradient += row * residual;
-        if let Some(added) = added {
-            out.by_k += row * (step * added.by_k);
-        }
-        out.square += residual * residual;
-        out.used += 1;
-        if u > 0.0 {
-            out.paper = (out.paper.0 + residual * residual, out.paper.1 + 1.0);
-        }
-    }
-    out
 }

@@ -42,6 +42,8 @@ pub struct Added {
 }
 
 impl PixelShape {
+    pub const NOTHING: Self = Self { strength: 0.0 };
+
     /// Of an edge with this unit vector across it, where paper is clipped.
     pub fn of(across: &Vector2<f64>, is_clipped: bool) -> Self {
         let strength = OF_PIXEL * (across.x.powi(4) + across.y.powi(4));
@@ -71,5 +73,47 @@ impl PixelShape {
     /// Variance of `k`.
     pub fn variance(&self, blur_px: f64) -> f64 {
         (UNKNOWN * self.strength(blur_px).0).powi(2) + OF_LENS * OF_LENS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::circles::normal_tail;
+
+    fn normal(u: f64) -> (f64, f64) {
+        let (tail, phi) = normal_tail(u as f32);
+        (1.0 - f64::from(tail), f64::from(phi))
+    }
+
+    /// A lens of 0.4 px and a pixel along the side: the mean of the edge over the pixel. The term leaves a quarter of what is beside the normal
+    /// distribution.
+    #[test]
+    fn the_area_of_a_pixel_is_in_the_edge() {
+        let (lens, shape) = (0.4_f64, PixelShape::of(&Vector2::new(0.0, 1.0), true));
+        let blur = (lens * lens + SHARPEST_SQUARE).sqrt();
+        let (mut beside, mut left) = (0.0_f64, 0.0_f64);
+        for k in -30..=30 {
+            let y = 0.05 * f64::from(k);
+            let over = (0..200).map(|j| normal((y - 0.4975 + 0.005 * f64::from(j)) / lens).0).sum::<f64>() / 200.0;
+            let (gauss, phi) = normal(y / blur);
+            beside = beside.max((over - gauss).abs());
+            left = left.max((over - gauss - shape.add(y / blur, phi, blur).share).abs());
+        }
+        assert!(beside > 2e-3 && left < 0.3 * beside, "{beside} {left}");
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_term() {
+        let shape = PixelShape::of(&Vector2::new(0.6, 0.8), true);
+        let share = |u: f64, s: f64| shape.add(u, (-0.5 * u * u).exp(), s).share;
+        for (u, s, step) in [(-2.1, 0.5, 1e-5), (-0.7, 0.35, 1e-5), (1.3, 0.9, 1e-5)] {
+            let added = shape.add(u, (-0.5 * u * u).exp(), s);
+            let by_u = (share(u + step, s) - share(u - step, s)) / (2.0 * step);
+            // at the same place
+            let at = |ln: f64| share(u * (-ln).exp(), s * ln.exp());
+            let by_blur = (at(step) - at(-step)) / (2.0 * step);
+            assert!((added.by_u - by_u).abs() < 1e-8 && (added.by_blur - by_blur).abs() < 1e-8, "{u} {s}");
+        }
     }
 }

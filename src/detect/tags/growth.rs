@@ -53,7 +53,7 @@ const UNLIKE_SHARE: f64 = 0.03;
 /// Growth that nothing tells, as a share of the blur: that of the light to the power of 1 / 2.2 for ink that reflects 3 to 6 % of the paper.
 const OF_ENCODING: f64 = 0.4;
 /// Square of the standard error of a median over that of a mean.
-const OF_MEDIAN: f64 = std::f64::consts::FRAC_PI_2;
+pub(super) const OF_MEDIAN: f64 = std::f64::consts::FRAC_PI_2;
 
 /// By how much ink has grown.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,6 +69,12 @@ impl Growth {
     pub fn untold(blur_px: f64, smoothing_px: f64) -> Self {
         let square = (blur_px * blur_px - smoothing_px * smoothing_px).max(0.0);
         Self { px: 0.0, variance: OF_ENCODING * OF_ENCODING * square }
+    }
+
+    /// The mean of both by their variances.
+    pub fn beside(self, other: &Self) -> Self {
+        let [a, b] = [self.variance, other.variance].map(f64::recip);
+        Self { px: (a * self.px + b * other.px) / (a + b), variance: (a + b).recip() }
     }
 
     /// That of the outline of a tag, where its code says it.
@@ -286,10 +292,9 @@ impl InPicture {
     /// The growth of a tag that says this itself: the mean of both by their variances.
     pub fn with(&self, own: Option<Growth>) -> Growth {
         let Some(own) = own else { return Growth { px: self.middle, variance: self.variance } };
-        let [a, b] = [own.variance, self.variance].map(f64::recip);
+        let both = own.beside(&Growth { px: self.middle, variance: self.variance });
         // It is one of those that the middle is of: a single one is known no better by that.
-        let variance = (a + b).recip().max(own.variance / self.tags);
-        Growth { px: (a * own.px + b * self.middle) / (a + b), variance }
+        Growth { variance: both.variance.max(own.variance / self.tags), ..both }
     }
 }
 

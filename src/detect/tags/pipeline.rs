@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::beside::Printed;
 use super::code::{Reader, SURE_BITS};
 use super::edge_line::{ENDS_SPARE_PX, EdgeLine, Measured, Side};
+use super::encoding::{self, Askew, decoded};
 use super::growth::{self, Growth, InPicture, Outlined};
 use super::layout::{Layout, Tagged};
 use super::misfit::Usual;
@@ -222,14 +223,16 @@ impl<'a> Board<'a> {
 
     /// Measures the corners; how far the sides may be off in common, px.
     fn measure(&self, found: &Found, detection: &mut Detection) -> f64 {
-        let sides: Sides = found.iter().map(|(place, corners)| (*place, self.sides(*place, corners))).collect();
+        let sides: Sides =
+            found.iter().map(|(place, corners)| (*place, self.sides(self.picture, *place, corners))).collect();
         let usual = Usual::of(sides.values().flatten().flatten());
         let sides: Sides = sides.into_iter().map(|(place, four)| (place, usual.undisturbed(four))).collect();
         let own = self.grown(found, &sides);
         let known = InPicture::of(&own.values().copied().collect::<Vec<_>>());
         let blur_px = median(sides.values().flatten().flatten().map(EdgeLine::blur_px)).unwrap_or(0.0);
+        let untold = if known.is_some() { Growth::untold(0.0, 0.0) } else { self.untold(found, &sides, blur_px) };
         let of_place = |place: &usize| match known.map(|known| known.with(own.get(place).copied())) {
-            None => Growth::untold(blur_px, self.smoothing_px),
+            None => untold,
             Some(growth) if self.tags.print == TagPrint::Kalibr => growth,
             Some(growth) => growth.of_outline(),
         };
@@ -272,8 +275,8 @@ impl<'a> Board<'a> {
 
     /// The sides of a tag with these corners. Where its code shines through its border, or its corners lie elsewhere, as those of bent sides
     /// do, once more with the corners that they have.
-    fn sides(&self, place: usize, corners: &Quad) -> [Measured; 4] {
-        let (mut corners, mut sides) = (*corners, self.sides_from(place, corners));
+    fn sides(&self, picture: &Picture, place: usize, corners: &Quad) -> [Measured; 4] {
+        let (mut corners, mut sides) = (*corners, self.sides_from(picture, place, corners));
         for again in 0..MOST_AGAIN {
             let measured = crossings(&sides, &corners);
             let found = [0, 1, 2, 3].map(|k: usize| measured[k].map_or(corners[k], |(uv, _)| uv));
@@ -282,21 +285,24 @@ impl<'a> Board<'a> {
             if !is_elsewhere && !is_lit {
                 break;
             }
-            (corners, sides) = (found, self.sides_from(place, &found));
+            (corners, sides) = (found, self.sides_from(picture, place, &found));
         }
         sides
     }
 
-    fn sides_from(&self, place: usize, corners: &Quad) -> [Measured; 4] {
+    fn sides_from(&self, picture: &Picture, place: usize, corners: &Quad) -> [Measured; 4] {
         let printed = self.print_of(place);
         [0, 1, 2, 3].map(|k: usize| {
-            let (from, to) = (corners[k], corners[(k + 1) % 4]);
-            let module = width(corners, k) / self.reader.side() as f64;
-            let (ink_px, paper_px) = (module * self.reader.border() as f64, module * self.gap().min(2.0));
-            let side = Side { from: to, to: from, ink_px, paper_px };
-            let line = EdgeLine::fit(self.picture, &side, || printed.beside(corners, k))?;
+            let line = EdgeLine::fit(picture, &self.side(corners, k), || printed.beside(corners, k))?;
             Ok(line.widened(variance_factor(line.blur_px(), self.smoothing_px)))
         })
+    }
+
+    /// Side `k` of a tag with these corners.
+    fn side(&self, corners: &Quad, k: usize) -> Side {
+        let module = width(corners, k) / self.reader.side() as f64;
+        let (ink_px, paper_px) = (module * self.reader.border() as f64, module * self.gap().min(2.0));
+        Side { from: corners[(k + 1) % 4], to: corners[k], ink_px, paper_px }
     }
 
     fn print_of(&self, place: usize) -> Printed<'_> {
@@ -330,6 +336,27 @@ impl<'a> Board<'a> {
         };
         let whole = of_code(true);
         if whole.is_empty() { of_code(false) } else { whole }
+    }
+
+    /// How far ink reaches beyond its place where no tag says it.
+    fn untold(&self, found: &Found, sides: &Sides, blur_px: f64) -> Growth {
+        let untold = Growth::untold(blur_px, self.smoothing_px);
+        let Some(light) = decoded(self.picture) else { return untold };
+        let askew = |(place, four): (&usize, &[Measured; 4])| self.askew(&light, *place, &found[place], four);
+        let sides: Vec<Askew> = sides.iter().flat_map(askew).collect();
+        encoding::growth(&sides).map_or(untold, |growth| growth.beside(&untold))
+    }
+
+    /// How askew the sides of a tag are, and how far they lie elsewhere in a decoded copy of the picture.
+    fn askew(&self, light: &Picture, place: usize, corners: &Quad, sides: &[Measured; 4]) -> Vec<Askew> {
+        let (printed, of_light) = (self.print_of(place), self.sides(light, place, corners));
+        let of_side = |k: usize| {
+            let (side, beside) = (self.side(corners, k), || printed.beside(corners, k));
+            let (line, lit) = (sides[k].ok()?, of_light[k].ok()?);
+            let (as_is, decoded) = (line.skew(self.picture, &side, beside)?, lit.skew(light, &side, beside)?);
+            Some(Askew { as_is, decoded, moved_px: line.step_to(&lit) })
+        };
+        (0..4).filter_map(of_side).collect()
     }
 
     /// What the code of a tag says, whose corners have these covariances.
