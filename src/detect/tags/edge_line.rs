@@ -61,6 +61,10 @@ const NEARLY_AT_REST_PX: f64 = 5e-3;
 const LEVEL: f64 = 0.3;
 /// The same of the step to paper that is clipped: it is seen as the least that it may be.
 const CLIPPED_LEVEL: f64 = 1.0;
+/// What light that changes across a side leaves beside clipped paper, as a share of the step; it is alike all along a side, where it says so
+/// many numbers.
+const OTHER_SHAPE: f64 = 0.005;
+const OF_AN_EDGE: f64 = 8.0;
 /// Prior sigma of a slope of the light along the side, as a share of the contrast per px; it may change by itself over the side.
 const SLOPE_PER_PX: f64 = 0.01;
 /// What lies beyond ink and paper is seen so many blurs before it: at two by 2 % of the contrast.
@@ -471,6 +475,8 @@ fn iterate(
             if !shape.is_nothing() {
                 let response = factor.solve(&(by_k * information)).fixed_rows::<SHAPE>(0).into_owned();
                 covariance += response * response.transpose() * shape.variance(blur);
+                let of_light = (OTHER_SHAPE * contrast / noise).powi(2) * used as f64 / OF_AN_EDGE;
+                covariance[(0, 0)] *= 1.0 + of_light;
             }
             let fit = Fit {
                 covariance,
