@@ -11,22 +11,9 @@ struct Name(&'static str);
 
 impl<'de> Deserialize<'de> for Name {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_identifier(NameVisitor)
-    }
-}
-
-struct NameVisitor;
-
-impl Visitor<'_> for NameVisitor {
-    type Value = Name;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the name of a limit")
-    }
-
-    fn visit_str<E: Error>(self, name: &str) -> Result<Name, E> {
+        let name = String::deserialize(deserializer)?;
         let known = Limits::NAMES.iter().find(|known| **known == name);
-        known.map(|known| Name(known)).ok_or_else(|| E::unknown_field(name, Limits::NAMES))
+        known.map(|known| Name(known)).ok_or_else(|| Error::unknown_field(&name, Limits::NAMES))
     }
 }
 

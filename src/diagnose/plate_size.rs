@@ -322,18 +322,28 @@ impl<'a> ReleasedSize<'a> {
     }
 }
 
-/// Where the markers of a plate that were seen should be, by its file, and where they are.
-fn places(problem: &Problem, shape: &PlateShape, plate: usize) -> Vec<[Vector3<f64>; 2]> {
-    let stated = |m: usize| problem.plates[plate].markers[m].position_m;
-    seen_markers(problem, plate).into_iter().map(|m| [stated(m), shape.position(m)]).collect()
+/// A marker of a plate that was seen: where it should be, by its file, where it is, and the variance per axis that its tolerance leaves it.
+struct Place {
+    stated: Vector3<f64>,
+    found: Vector3<f64>,
+    variance: f64,
+}
+
+fn places(problem: &Problem, shape: &PlateShape, plate: usize) -> Vec<Place> {
+    let place = |m: usize| Place {
+        stated: problem.plates[plate].markers[m].position_m,
+        found: shape.position(m),
+        variance: problem.marker_information(plate, m).recip(),
+    };
+    seen_markers(problem, plate).into_iter().map(place).collect()
 }
 
 /// By how much the markers of a plate that were seen lie further apart than its file says.
 fn growth(problem: &Problem, shape: &PlateShape, plate: usize) -> Option<f64> {
     let places = places(problem, shape, plate);
-    let middle = places.iter().map(|[stated, _]| stated).sum::<Vector3<f64>>() / places.len().max(1) as f64;
+    let middle = places.iter().map(|place| place.stated).sum::<Vector3<f64>>() / places.len().max(1) as f64;
     let (mut along, mut square) = (0.0, 0.0);
-    for [stated, found] in &places {
+    for Place { stated, found, .. } in &places {
         along += (stated - middle).dot(&(found - stated));
         square += (stated - middle).norm_squared();
     }
@@ -343,10 +353,9 @@ fn growth(problem: &Problem, shape: &PlateShape, plate: usize) -> Option<f64> {
 /// The same along x and along y, each with what the tolerance of the markers leaves open of it. What is turned or skew is none of it.
 fn stretch(Adjustment { problem, state }: &Adjustment, plate: usize) -> Option<[(f64, f64); 2]> {
     let places = places(problem, &state.plates[plate], plate);
-    let of_marker = |m: usize| problem.marker_information(plate, m).recip();
-    let variance = seen_markers(problem, plate).into_iter().map(of_marker).sum::<f64>() / places.len().max(1) as f64;
+    let variance = places.iter().map(|place| place.variance).sum::<f64>() / places.len().max(1) as f64;
     let along = |axis: usize| {
-        let displaced = places.iter().map(|[stated, found]| (stated.xy(), found[axis] - stated[axis]));
+        let displaced = places.iter().map(|Place { stated, found, .. }| (stated.xy(), found[axis] - stated[axis]));
         let found = slopes(&displaced.collect::<Vec<_>>())?;
         Some((found.of[axis], (variance * found.covariance[(axis, axis)]).sqrt()))
     };

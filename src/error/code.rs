@@ -4,7 +4,7 @@
 
 use std::fmt;
 
-use serde::de::Visitor;
+use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// What kind of failure it was; fixes the exit code of the program.
@@ -423,25 +423,12 @@ impl Serialize for Code {
     }
 }
 
+/// By its name. What serde derives for so many is much code.
 impl<'de> Deserialize<'de> for Code {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_str(ByName)
-    }
-}
-
-/// Reads a code by its name. What serde derives for so many is much code.
-struct ByName;
-
-impl Visitor<'_> for ByName {
-    type Value = Code;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the name of a code")
-    }
-
-    fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Code, E> {
-        let found = Code::ALL.iter().find(|code| code.name() == name).copied();
-        found.ok_or_else(|| E::unknown_variant(name, Code::NAMES))
+        let name = String::deserialize(deserializer)?;
+        let found = Self::ALL.iter().find(|code| code.name() == name).copied();
+        found.ok_or_else(|| Error::unknown_variant(&name, Self::NAMES))
     }
 }
 

@@ -24,6 +24,7 @@ const MARGIN_NS: i64 = 50_000_000;
 /// A robot that seems to stand for less than this need not have stopped, ns: what is seen of a standstill is shorter than it by the time
 /// over which speed is taken.
 const LEAST_SEEN_NS: i64 = 20_000_000;
+
 /// The stops of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extracted {
