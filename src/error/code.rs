@@ -279,6 +279,7 @@ codes! {
         SolutionDiffers "solution_differs" "a solution.json is of another robot or series",
         StatedExceeded "stated_exceeded" "a model misses more in another measurement than its solution states",
         OwnMeasurement "own_measurement" "a model is judged by what it was fitted to",
+        ModelsNotTold "models_not_told" "a measurement does not tell a model from the nominal one",
         NotCorrected "not_corrected" "a model misses as much as robots that nobody corrected",
     }
     Unsolved "Geometry that does not fit" {

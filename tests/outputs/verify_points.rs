@@ -410,3 +410,55 @@ fn the_most_that_a_solution_states_at_points_has_the_doubt_of_its_joint_noise_in
     let untold = added(&serde_json::Value::Null);
     assert!((untold / with_doubt - 2.5).abs() < 0.1, "{untold} mm");
 }
+
+/// Ten points of one neighbourhood of the robot of the shipped report, with this noise per axis, or where the nominal robot puts them.
+fn neighbours(folder: &Path, reach: f64, sigma_m: f64, by_nominal: bool) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let truth = Truth::read(&root.join("datasets/kr6_small/truth.toml")).unwrap();
+    let (_, nominal) = kr6();
+    let robot = if by_nominal { nominal } else { truth.robot(&nominal.chain).unwrap() };
+    let mut table = format!("x_m,y_m,z_m,{}\n", truth.joints.join(","));
+    for k in 0..10 {
+        let offset = |j: usize| reach * (((k * (2 * j + 3) + 5 * j) % 17) as f64 - 8.0) / 8.0;
+        let readings: Vec<f64> = truth.held_out[0].readings.iter().enumerate().map(|(j, q)| q + offset(j)).collect();
+        let error = [1, 3, 5].map(|step| (step * k % 7) as f64 / 2.0 - 1.5);
+        let at = robot.base_from_tip(&readings).transform(&[0.03, -0.02, 0.1].into()) + sigma_m * Vector3::from(error);
+        let cells: Vec<String> = at.iter().chain(&readings).map(|v| format!("{v:.9}")).collect();
+        writeln!(table, "{}", cells.join(",")).unwrap();
+    }
+    let file = folder.join(format!("neighbours_{reach}_{by_nominal}.csv"));
+    std::fs::write(&file, table).unwrap();
+    file
+}
+
+/// Of neighbouring points frame and reflector take up what two robots differ by.
+#[test]
+fn points_that_do_not_tell_a_model_from_the_nominal_robot_are_a_doubt() {
+    let report = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/kr6_small");
+    let folder = tempfile::tempdir().unwrap();
+    let judged = |points: &Path| {
+        let mut command = Command::cargo_bin("robotcal").unwrap();
+        command.args(["verify", "--joint-unit", "rad", "--urdf"]).arg(report.join("kuka_kr6_r900.calibrated.urdf"));
+        command.arg("--compensation").arg(report.join("compensation.toml")).arg("--nominal").arg(kr6().0);
+        let found = command.arg("--points").arg(points).output().unwrap();
+        let text = String::from_utf8(found.stdout).unwrap();
+        println!("{text}{}", String::from_utf8_lossy(&found.stderr));
+        (found.status.code(), codes(&text), text)
+    };
+    let (exit, said, text) = judged(&neighbours(folder.path(), 0.03, 5e-5, false));
+    assert_eq!((exit, said), (Some(0), vec![Code::ModelsNotTold]));
+    let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let number = |before: &str| -> f64 {
+        let (front, _) = words.split_once(before).unwrap();
+        front.split_whitespace().last().unwrap().parse().unwrap()
+    };
+    // Robots as these differ by a millimetre over the stops of a series.
+    let [here, at_stops, needed] = [" mm here, beside", " mm at the stops", " points or more"].map(number);
+    assert!(here < 0.05 && at_stops > 0.5 && needed >= 10.0, "{here} {at_stops} {needed}");
+    // So many of them tell.
+    let (exit, said, _) = judged(&measured_by_a_tracker(folder.path(), 0.0));
+    assert_eq!((exit, said), (Some(0), vec![]));
+    // Where the nominal robot is the better one, the whole interval says so.
+    let (exit, said, _) = judged(&neighbours(folder.path(), 0.5, 0.0, true));
+    assert!(exit == Some(1) && !said.contains(&Code::ModelsNotTold), "{exit:?} {said:?}");
+}

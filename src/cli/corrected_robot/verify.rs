@@ -10,10 +10,10 @@ use super::compensate_models::not_given;
 use super::verify_args::VerifyArgs;
 use super::verify_series;
 use super::verify_stated::Stated;
-use super::verify_verdict::Reasons;
+use super::verify_verdict::{Gain, Measured, Reasons};
 use crate::assess::{
-    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, Ratio, ReadingMistake, StepCause, bootstrap_ratio,
-    by_cluster, device_moved, fit_points, odd_points, reading_mistake,
+    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, ReadingMistake, StepCause, bootstrap_ratio, by_cluster,
+    device_moved, fit_points, odd_points, reading_mistake,
 };
 use crate::cli::Verdict;
 use crate::cli::flags::joint_table::{self, Unit};
@@ -119,12 +119,11 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
             limits.scatter_images
         ));
     } else {
-        match nominal.as_ref().map(|nominal| gain(&model, nominal, left_out)) {
-            Some(Some(ratio)) => reasons.add_gain(ratio, "points", limits),
-            Some(None) => reasons.against.push("the nominal model leaves nothing".into()),
-            None => {}
+        let gain = nominal.as_ref().and_then(|nominal| gain(&model, nominal, left_out));
+        if nominal.is_some() && gain.is_none() {
+            reasons.against.push("the nominal model leaves nothing".into());
         }
-        reasons.add_error((&args.urdf, rms_m), expected, nominal.is_some(), limits);
+        reasons.add(&Measured { urdf: &args.urdf, rms_m, stated: expected, gain }, limits);
     }
     let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
@@ -162,10 +161,13 @@ fn point_sigma(stated: Option<f64>, limits: &Limits) -> Result<f64> {
 }
 
 /// The error of a model over that of the nominal one, by the points but some.
-fn gain(model: &Judged, nominal: &Judged, left_out: &[usize]) -> Option<Ratio> {
+fn gain<'a>(model: &Judged, nominal: &'a Judged, left_out: &[usize]) -> Option<Gain<'a>> {
+    let robot = &nominal.robot;
     let [model, nominal] = [model, nominal].map(|judged| judged.without(left_out));
     let (model, nominal) = (model?, nominal?);
-    bootstrap_ratio(&units(&model, &model), &units(&model, &nominal))
+    let ratio = bootstrap_ratio(&units(&model, &model), &units(&model, &nominal))?;
+    let readings = model.points.into_iter().map(|point| point.readings).collect();
+    Some(Gain { ratio, nominal: robot, of: "points", at: (readings, model.fit.tip_point_m) })
 }
 
 fn judged(

@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
+use nalgebra::Vector3;
+
 use super::compensate_frames::Side;
 use super::compensate_models::not_given;
 use super::verify_args::VerifyArgs;
 use super::verify_stated::Stated;
-use super::verify_verdict::{Reasons, of_series};
-use crate::assess::{Limits, bootstrap_ratio, by_cluster, root_mean_square};
+use super::verify_verdict::{Gain, Measured, Reasons, of_series};
+use crate::assess::{Limits, Ratio, bootstrap_ratio, by_cluster, root_mean_square};
 use crate::calibration::{Ends, Inputs, Observed};
 use crate::cli::Verdict;
 use crate::cli::flags::recording::RecordingArgs;
@@ -40,9 +42,7 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
         let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
         let images: Vec<&JudgedImage> = images.iter().collect();
         say_line!("{}", line("model", &args.urdf, &images));
-        let mut reasons = Reasons::default();
-        weigh(args, &mut reasons, &model, Measured { series: &series, files: &files, images: &images });
-        return Ok(reasons.verdict());
+        return Ok(weigh(args, &model, &Seen { series: &series, files: &files, images: &images }, None).verdict());
     };
     // Poses of a controller are those of the model that is in it, whichever robot is judged by them.
     let nominal_inputs = read(file)?;
@@ -53,12 +53,13 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let missing = missing(args, &model, &files)?;
     let series = in_told_postures(&model.robot, &with_added(series, &missing), &model.limits);
     let as_shown: Vec<f64> = missing.iter().map(|offset| -offset).collect();
-    let nominal = judged((&Robot::nominal(chain), file), &with_added(series.clone(), &as_shown), &model.limits)?;
+    let robot = Robot::nominal(chain);
+    let nominal = judged((&robot, file), &with_added(series.clone(), &as_shown), &model.limits)?;
     let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
     let (images, nominal) = of_both(&images, &nominal);
-    let mut reasons = compare(args, (file, &model.limits), &images, &nominal)?;
-    weigh(args, &mut reasons, &model, Measured { series: &series, files: &files, images: &images });
-    Ok(reasons.verdict())
+    let ratio = compare(args, file, &images, &nominal)?;
+    let gain = Gain { ratio, nominal: &robot, of: "images", at: at_images(&model.robot, &series) };
+    Ok(weigh(args, &model, &Seen { series: &series, files: &files, images: &images }, Some(gain)).verdict())
 }
 
 /// What is judged, with what its solution states and the limits with which that was found.
@@ -95,29 +96,40 @@ fn with_added(mut series: Vec<MeasuredSeries>, offsets: &[f64]) -> Vec<MeasuredS
 }
 
 /// What was measured, and how the model does there.
-struct Measured<'a> {
+struct Seen<'a> {
     series: &'a [MeasuredSeries],
     files: &'a [InputFile],
     images: &'a [&'a JudgedImage],
 }
 
 /// The model beside what its solution states, and what the series shows of itself where it misses more.
-fn weigh(args: &VerifyArgs, reasons: &mut Reasons, model: &Model, measured: Measured<'_>) {
-    let Measured { series, files, images } = measured;
+fn weigh(args: &VerifyArgs, model: &Model, seen: &Seen<'_>, gain: Option<Gain<'_>>) -> Reasons {
+    let Seen { series, files, images } = *seen;
     let Model { robot, stated, limits } = model;
     let urdf = &args.urdf;
     let expected = stated.as_ref().and_then(|s| Some((s, s.at_stops(series)?)));
     let rms_m = 1e-3 * root_mean_square(&units(images));
-    reasons.add_error((urdf, rms_m), expected, args.nominal.is_some(), limits);
+    let is_unexplained = expected.is_none() && rms_m > 1e-3 * limits.flange_sigma_mm;
+    let mut reasons = Reasons::default();
+    reasons.add(&Measured { urdf, rms_m, stated: expected, gain }, limits);
     if let Some(stated) = stated.as_ref().filter(|s| s.was_fitted_to(files, series)) {
         reasons.add_own(urdf, stated);
     }
     let side = Side { robot, urdf, solution: None };
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
-    let is_unexplained = expected.is_none() && rms_m > 1e-3 * limits.flange_sigma_mm;
     if reasons.misses() || is_unexplained {
         reasons.findings.extend(shown_by_series(robot.chain.clone(), series, limits));
     }
+    reasons
+}
+
+/// Readings of the stops, and a point as far from the tip as what stands still, along no axis.
+fn at_images(robot: &Robot, series: &[MeasuredSeries]) -> (Vec<Vec<f64>>, Vector3<f64>) {
+    let readings: Vec<Vec<f64>> = series.iter().flat_map(|s| &s.stops).filter_map(|s| s.readings.clone()).collect();
+    let squares: Vec<(f64, f64)> =
+        readings.iter().map(|q| (robot.base_from_tip(q).translation.norm_squared(), 1.0)).collect();
+    let lever_m = root_mean_square(&squares);
+    (readings, Vector3::repeat(lever_m / 3.0f64.sqrt()))
 }
 
 /// What the series shows of itself with the origins of the model held: a plate or a camera that was moved, a zero that is off.
@@ -158,12 +170,7 @@ fn require_same_joints(model: &Chain, nominal: &Chain, urdf: &Path, file: &Path)
     Err(Error::new(Code::JointUnknown, urdf.display(), what, remedy))
 }
 
-fn compare(
-    args: &VerifyArgs,
-    (file, limits): (&Path, &Limits),
-    model: &[&JudgedImage],
-    nominal: &[&JudgedImage],
-) -> Result<Reasons> {
+fn compare(args: &VerifyArgs, file: &Path, model: &[&JudgedImage], nominal: &[&JudgedImage]) -> Result<Ratio> {
     say_line!(
         "images    {} that both models predict; camera, hand-eye transform and plate fitted to the others",
         model.len()
@@ -172,17 +179,14 @@ fn compare(
     say_line!("{}", line("nominal", file, nominal));
     let postures: Vec<usize> = model.iter().map(|i| i.posture).collect();
     let of_postures = |images: &[&JudgedImage]| by_cluster(&postures, &units(images));
-    let ratio = bootstrap_ratio(&of_postures(model), &of_postures(nominal)).ok_or_else(|| {
+    bootstrap_ratio(&of_postures(model), &of_postures(nominal)).ok_or_else(|| {
         Error::new(
             Code::FitUndetermined,
             "verification",
             "the models have no image in common",
             "check that both URDFs are of this robot",
         )
-    })?;
-    let mut reasons = Reasons::default();
-    reasons.add_gain(ratio, "images", limits);
-    Ok(reasons)
+    })
 }
 
 fn judged((robot, file): (&Robot, &Path), series: &[MeasuredSeries], limits: &Limits) -> Result<Vec<JudgedImage>> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{DMatrix, Vector6};
+use nalgebra::{DMatrix, Vector3, Vector6};
 
 use super::compensate_frames::{Side, solution};
 use crate::assess::{
@@ -106,11 +106,7 @@ impl Stated {
         let scatter_m = self.scatter_m(&left.by_reading, points.len()).map(|m| (m * m + backlash).sqrt());
         let lacking_m = self.part.as_ref().map_or(Some(0.0), |part| {
             let on_tip = fit_points(robot, points)?.tip_point_m;
-            let of_whole = |p: &MeasuredPoint| MeasuredPoint {
-                position_m: robot.base_from_tip(&p.readings).transform(&on_tip),
-                readings: p.readings.clone(),
-            };
-            Some(fit_points(part, &points.iter().map(of_whole).collect::<Vec<_>>())?.rms_m)
+            apart_m([robot, part], &on_tip, points.iter().map(|p| p.readings.as_slice()))
         });
         let expected = self.expectation(([left.model_m, left.most_model_m], lacking_m?), scatter_m)?;
         // Of so many coordinates, less what frame and reflector take up.
@@ -159,6 +155,15 @@ impl Stated {
         is_file || measured_series(&self.record).is_ok_and(|own| has_exposure_of(&own, series))
     }
 
+    /// How far what is judged and a nominal robot put a point of the tip apart at some readings, and at the stops of the series that the solution was
+    /// found from, once frame and point are fitted: RMS, m.
+    pub fn apart_from(&self, nominal: &Robot, on_tip: &Vector3<f64>, readings: &[Vec<f64>]) -> Option<[f64; 2]> {
+        let robots = [self.part.as_ref().unwrap_or(&self.found.robot), nominal];
+        let own = measured_series(&self.record).ok()?;
+        let own = own.iter().flat_map(|s| &s.stops).filter_map(|stop| stop.readings.as_deref());
+        Some([apart_m(robots, on_tip, readings.iter().map(Vec::as_slice))?, apart_m(robots, on_tip, own)?])
+    }
+
     /// The solution.
     pub fn record(&self) -> &SolutionRecord {
         &self.record
@@ -187,6 +192,15 @@ fn is_input(record: &SolutionRecord, file: &InputFile) -> bool {
 fn rms(lengths: impl Iterator<Item = f64>) -> f64 {
     let squares: Vec<(f64, f64)> = lengths.map(|m| (m * m, 1.0)).collect();
     if squares.is_empty() { 0.0 } else { root_mean_square(&squares) }
+}
+
+/// How far two robots put a point of the tip apart, RMS, m, once frame and point are fitted.
+fn apart_m<'a>([a, b]: [&Robot; 2], on_tip: &Vector3<f64>, readings: impl Iterator<Item = &'a [f64]>) -> Option<f64> {
+    let by_first = |readings: &[f64]| MeasuredPoint {
+        position_m: a.base_from_tip(readings).transform(on_tip),
+        readings: readings.to_vec(),
+    };
+    Some(fit_points(b, &readings.map(by_first).collect::<Vec<_>>())?.rms_m)
 }
 
 /// How the tip of a second robot stands to that of a first one, without what a tool takes up: body twists.
