@@ -146,7 +146,15 @@ pub const CHECKS: &[Check] = &[
     check("mirror_image", Stage::Fit(|a, b, s| found(mirror_image::check(a, b, s)))),
     check("no_gain", Stage::Fit(|a, b, s| found(no_gain::check(a, b, s)))),
     check("zeros_off", Stage::LeftOut(|a, s| found(zeros_off::check(a, s)))),
-    check("plate_size", Stage::Fit(|a, b, s| found(plate_size::check(a, b, s)))),
+    Check {
+        // The robot takes up what a plate of another size leaves, and what it cannot looks like noise.
+        explains: |own, other| match (own, other) {
+            (Finding::DoubtedSize(own), Finding::JointNoiseLarge(noise)) => own.explains_noise(noise),
+            (Finding::DoubtedSize(own), Finding::ParameterOff(off)) => own.explains_parameter(off),
+            _ => false,
+        },
+        ..check("plate_size", Stage::Fit(|a, b, s| found(plate_size::check(a, b, s))))
+    },
     check("contradicted_distances", Stage::Fit(|a, b, s| found(contradicted_distances::check(a, b, s)))),
     Check {
         explains: |own, other| match (own, other) {

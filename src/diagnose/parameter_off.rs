@@ -1,9 +1,12 @@
 //! Is the robot as far from nominal as robots are?
 
+use nalgebra::DVector;
+
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
+use crate::problem::Problem;
 
 /// A parameter of the robot is far from nominal.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +28,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Para
     let values = fit.state.values(&problem.layout);
     let of_column = |c: usize| {
         let column = &problem.layout.columns[c];
-        let usual_deviations = ((values[c] - column.prior_mean) / problem.stated_sigma(c)).abs();
+        let usual_deviations = usual_deviations(problem, &values, c);
         (usual_deviations > setting.limits.sigmas_beyond_tolerance).then(|| {
             let parameter = column.name.clone();
             let is_far = usual_deviations > setting.limits.far_beyond_tolerance;
@@ -34,6 +37,11 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Para
         })
     };
     problem.layout.robot().filter_map(of_column).collect()
+}
+
+/// How many times what robots usually deviate by a parameter is off.
+pub(super) fn usual_deviations(problem: &Problem, values: &DVector<f64>, column: usize) -> f64 {
+    ((values[column] - problem.layout.columns[column].prior_mean) / problem.stated_sigma(column)).abs()
 }
 
 impl Kind for ParameterOff {

@@ -3,7 +3,9 @@
 
 use nalgebra::{DVector, Vector3};
 
+use super::joint_noise::{JointNoiseLarge, noisiest_joint};
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::parameter_off::{ParameterOff, usual_deviations};
 use super::rail::{OR_THE_RAIL, is_on_rail, with_gears_released};
 use super::slopes::slopes;
 use crate::assess::{Accuracy, Limits};
@@ -60,6 +62,8 @@ pub enum DoubtedSize {
         weight: Weight,
         /// What says so.
         told_by: ToldBy,
+        /// What is in order of the robot with the size that it says.
+        in_order: InOrder,
     },
     /// Rows and columns differ in scale.
     Uneven {
@@ -71,7 +75,35 @@ pub enum DoubtedSize {
         along: Option<[(f64, f64); 2]>,
         /// What tells its size.
         told_by: ToldBy,
+        /// What is in order of the robot with the size that it tells.
+        in_order: InOrder,
     },
+}
+
+/// What is in order of a robot in the fit with a free size of a plate, whatever the fit with the stated size says.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct InOrder {
+    /// Series whose joint noise is that of robots.
+    series: Vec<String>,
+    /// Parameters that are as far from nominal as robots are.
+    parameters: Vec<String>,
+}
+
+impl InOrder {
+    /// Parameters are held against what is stated of them in `problem`: none is released there.
+    fn of(released: &Fit, problem: &Problem, setting: &CheckContext) -> Self {
+        let limits = setting.limits;
+        let is_quiet =
+            |k: usize| noisiest_joint(released, k).is_some_and(|(.., sigma)| sigma < limits.unusual_joint_noise);
+        // A noise that was stated is none that was found.
+        let all = if setting.stated_noise.is_some() { &[][..] } else { setting.series };
+        let series = all.iter().enumerate().filter(|(k, _)| is_quiet(*k)).map(|(_, s)| s.name.clone()).collect();
+        let values = released.state.values(&problem.layout);
+        let is_usual = |c: &usize| usual_deviations(problem, &values, *c) <= limits.sigmas_beyond_tolerance;
+        let usual = problem.layout.robot().filter(is_usual);
+        let parameters = usual.map(|c| problem.layout.columns[c].name.clone()).collect();
+        Self { series, parameters }
+    }
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<DoubtedSize> {
@@ -86,24 +118,26 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
         // A size that is stated wrongly makes the links look worse than they are, and what they say less certain; a stretched plate as well.
         let is_suspected = || released.one_step().is_some_and(|told| beyond(&told, limits.plate_size_suspected));
         let uneven = uneven(&fit.adjustment, k, limits);
-        let fitted = if uneven.is_some() || is_suspected() { released.fitted() } else { None };
-        let fitted = fitted.filter(|(told, _)| told.sigma < limits.plate_size_told);
+        let fitted = if uneven.is_some() || is_suspected() { released.fitted(problem, setting) } else { None };
+        let fitted = fitted.filter(|fitted| fitted.told.sigma < limits.plate_size_told);
+        let in_order = || fitted.as_ref().map(|fitted| fitted.in_order.clone()).unwrap_or_default();
         let measured = plate.scale.is_some();
-        if let Some((told, _)) = fitted
+        if let Some(Fitted { told, .. }) = &fitted
             && let Some(weight) = match told {
-                told if beyond(&told, limits.plate_size_sigmas) => Some(Weight::Gate),
-                told if !measured && beyond(&told, limits.plate_size_doubtful) => Some(Weight::Note),
+                told if beyond(told, limits.plate_size_sigmas) => Some(Weight::Gate),
+                told if !measured && beyond(told, limits.plate_size_doubtful) => Some(Weight::Note),
                 _ => None,
             }
         {
-            doubts.push(DoubtedSize::Contradicted { measured, off: told.off, sigma: told.sigma, weight, told_by });
+            let (off, sigma, in_order) = (told.off, told.sigma, in_order());
+            doubts.push(DoubtedSize::Contradicted { measured, off, sigma, weight, told_by, in_order });
         }
         if let Some((off, tolerance)) = uneven {
-            let along = fitted.and_then(|(told, axes)| {
-                let (axes, by_markers) = (axes?, stretch(&fit.adjustment, k)?);
+            let along = fitted.as_ref().and_then(|Fitted { told, along, .. }| {
+                let (axes, by_markers) = ((*along)?, stretch(&fit.adjustment, k)?);
                 Some([0, 1].map(|axis| (axes[axis], told.sigma.hypot(by_markers[axis].1))))
             });
-            doubts.push(DoubtedSize::Uneven { off, tolerance, along, told_by });
+            doubts.push(DoubtedSize::Uneven { off, tolerance, along, told_by, in_order: in_order() });
         }
     }
     doubts
@@ -112,7 +146,14 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
 /// Plates whose rows and columns differ in scale, as images alone say: their shape needs no robot.
 pub fn uneven_plates(adjustment: &Adjustment, limits: &Limits) -> Vec<DoubtedSize> {
     let all = (0..adjustment.problem.plates.len()).filter_map(|k| uneven(adjustment, k, limits));
-    all.map(|(off, tolerance)| DoubtedSize::Uneven { off, tolerance, along: None, told_by: ToldBy::Links }).collect()
+    let uneven = |(off, tolerance)| DoubtedSize::Uneven {
+        off,
+        tolerance,
+        along: None,
+        told_by: ToldBy::Links,
+        in_order: InOrder::default(),
+    };
+    all.map(uneven).collect()
 }
 
 /// The x/y scale of a plate whose size was not measured and its prior sigma, where it is far beyond that.
@@ -122,6 +163,22 @@ fn uneven(adjustment: &Adjustment, plate: usize, limits: &Limits) -> Option<(f64
 }
 
 impl DoubtedSize {
+    /// What is in order without the doubt, where that fails the result.
+    fn in_order(&self) -> Option<&InOrder> {
+        let (Self::Contradicted { in_order, .. } | Self::Uneven { in_order, .. }) = self;
+        Some(in_order).filter(|_| self.weight() == Weight::Gate)
+    }
+
+    /// True where the joint noise of a series is in order with the size that is told.
+    pub(super) fn explains_noise(&self, noise: &JointNoiseLarge) -> bool {
+        self.in_order().is_some_and(|in_order| in_order.series.contains(&noise.series))
+    }
+
+    /// The same of a parameter.
+    pub(super) fn explains_parameter(&self, off: &ParameterOff) -> bool {
+        self.in_order().is_some_and(|in_order| in_order.parameters.contains(&off.parameter))
+    }
+
     /// Relative size of what is in doubt: of a stretched plate of the length that is off most, where the links tell.
     pub fn relative(&self) -> f64 {
         match self {
@@ -219,6 +276,14 @@ struct Told {
     sigma: f64,
 }
 
+/// What a fit with a free size says.
+struct Fitted {
+    told: Told,
+    /// By how much the plate is longer along x and along y.
+    along: Option<[f64; 2]>,
+    in_order: InOrder,
+}
+
 /// An adjustment in which nothing but images and links tells the size of a plate.
 struct ReleasedSize<'a> {
     adjustment: Adjustment,
@@ -288,15 +353,17 @@ impl<'a> ReleasedSize<'a> {
         self.told(&self.adjustment.state, factor.solve(&system.rhs)[at], variance)
     }
 
-    /// By a fit of its own, sizes of the errors included, and by how much it is longer along x and along y; `None` where it has no end.
-    fn fitted(&self) -> Option<(Told, Option<[f64; 2]>)> {
-        let options = ComponentOptions { joint: false, displacement: false, ..ComponentOptions::default() };
+    /// By a fit of its own, sizes of the errors included; `None` where it has no end. A joint noise that was not stated is free: a plate of another
+    /// size looks like noise. `stated` is the problem in which nothing is released.
+    fn fitted(&self, stated: &Problem, setting: &CheckContext) -> Option<Fitted> {
+        let joint = setting.stated_noise.is_none();
+        let options = ComponentOptions { joint, displacement: false, ..ComponentOptions::default() };
         let outcome = estimate_components(self.adjustment.clone(), &options);
         let fit = Some(outcome).filter(|o| o.status == Status::Converged)?.fit().ok()?;
         let told = self.told(&fit.state, 0.0, fit.covariance.reduced[(self.column(), self.column())])?;
         let lacks = told.off - self.off(&fit.state);
         let along = stretch(&fit.adjustment, self.index).map(|along| along.map(|(off, _)| off + lacks));
-        Some((told, along))
+        Some(Fitted { told, along, in_order: InOrder::of(&fit, stated, setting) })
     }
 
     /// By how much the plate of a state is larger than stated.

@@ -4,7 +4,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use crate::outputs_support::{context, robot, solved};
-use robotcal::diagnose::{DoubtedSize, ExchangedReadings, Finding, OddImage, SmallGain, ToldBy, Weight};
+use robotcal::diagnose::{DoubtedSize, ExchangedReadings, Finding, InOrder, OddImage, SmallGain, ToldBy, Weight};
 use robotcal::error::{Code, Notice};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
 use robotcal::output::verdict::{Trust, Verdict, VerdictReason};
@@ -166,6 +166,7 @@ fn what_was_seen_and_what_to_do_stay_apart() {
         sigma: 0.001,
         weight: Weight::Gate,
         told_by: ToldBy::Links,
+        in_order: InOrder::default(),
     });
     assert!(found.fails() && found.remedy().contains("; "), "a remedy of two parts: {found}");
     let mut record = record();
@@ -197,6 +198,7 @@ fn rows_that_were_exchanged_are_put_right_before_a_failed_result_is_tried_again(
         sigma: 0.001,
         weight: Weight::Gate,
         told_by: ToldBy::Links,
+        in_order: InOrder::default(),
     };
     let pair = vec!["img_003.png".to_owned(), "img_008.png".to_owned()];
     let exchanged = Finding::from(ExchangedReadings {

@@ -19,14 +19,19 @@ fn request(chain: &Chain) -> WorldRequest {
     WorldRequest { images: 24, least_markers: 12, seed: 9, ..WorldRequest::typical(chain.clone(), plate) }
 }
 
-fn seen(chain: &Chain) -> (MeasuredSeries, Vec<[f64; 3]>) {
-    let world = series(&request(chain)).unwrap();
+fn seen(chain: &Chain, request: &WorldRequest) -> (MeasuredSeries, Vec<[f64; 3]>) {
+    let world = series(request).unwrap();
     (measured(&world, chain), world.truth.marker_errors_m)
 }
 
 /// A series whose file states a plate larger by these factors along x and y, with a distance measured on the plate as it is.
 fn stated_series(x: f64, y: f64, bar: Option<(u32, u32)>) -> MeasuredSeries {
-    let (mut series, errors) = seen(&kr6());
+    stated_in(&request(&kr6()), x, y, bar)
+}
+
+/// The same of a world.
+fn stated_in(request: &WorldRequest, x: f64, y: f64, bar: Option<(u32, u32)>) -> MeasuredSeries {
+    let (mut series, errors) = seen(&kr6(), request);
     series.plate.scale = bar.map(|(from, to)| {
         let index = |id| series.plate.index_of(id).unwrap();
         let of = |id| series.plate.markers[index(id)].position_m + Vector3::from(errors[index(id)]);
@@ -130,6 +135,30 @@ fn a_print_that_is_stretched_and_too_small_is_told_along_both_axes() {
     }
 }
 
+/// "Fit to page": with the stated size the robot takes up what it can, and what it cannot looks like joint noise; with the size that the links tell
+/// both are in order. What is not in order then is said.
+#[test]
+fn what_a_wrong_print_makes_of_a_robot_is_not_said_beside_it() {
+    let limits = Limits::default();
+    for (x, y) in [(1.0 / 0.98, 1.0 / 0.96), (1.0 / 0.99, 1.0 / 0.97)] {
+        for (joint_noise_rad, is_noisy) in [(2e-5, false), (1.2e-3, true)] {
+            let request = WorldRequest { joint_noise_rad, ..request(&kr6()) };
+            let solution = identify(kr6(), &[stated_in(&request, x, y, None)], &Options::default()).unwrap();
+            let codes: Vec<Code> = solution.findings.iter().map(Finding::code).collect();
+            let (problem, state) = (&solution.fit.problem, &solution.fit.state);
+            let noise = problem.joint_sigma(0).into_iter().fold(0.0, f64::max);
+            let values = state.values(&problem.layout);
+            let off = |c: usize| (values[c] - problem.layout.columns[c].prior_mean).abs() / problem.stated_sigma(c);
+            let farthest = problem.layout.robot().map(off).fold(0.0, f64::max);
+            println!("{x} {y} {joint_noise_rad}: noise {noise}, farthest {farthest}, {codes:?}");
+            assert!(codes.contains(&Code::PlateUneven) && codes.contains(&Code::PlateSizeContradicted), "{codes:?}");
+            assert!(noise > limits.unusual_joint_noise || farthest > limits.sigmas_beyond_tolerance, "in order anyhow");
+            assert_eq!(codes.contains(&Code::JointNoiseLarge), is_noisy, "{codes:?}");
+            assert!(is_noisy || !codes.contains(&Code::ParameterOff), "{codes:?}");
+        }
+    }
+}
+
 /// The shape of a plate shows in images alone, its size does not.
 #[test]
 fn poses_alone_doubt_a_stretched_plate_and_no_other() {
@@ -154,7 +183,7 @@ fn poses_alone_doubt_a_stretched_plate_and_no_other() {
 #[test]
 fn a_wrist_alone_doubts_no_plate() {
     let chain = kr6();
-    let from = seen(&chain).0.stops[0].readings.clone().unwrap();
+    let from = seen(&chain, &request(&chain)).0.stops[0].readings.clone().unwrap();
     for seed in 1..6 {
         let turned = |k: usize| {
             let angle = |joint: usize, size: f64| from[joint] + size * (1.7 * (k * (joint + 1)) as f64).sin();
@@ -171,7 +200,7 @@ fn a_wrist_alone_doubts_no_plate() {
 #[test]
 fn a_two_stage_result_states_what_is_not_known_of_the_size_of_the_plate() {
     let chain = kr6();
-    let (mut series, _) = seen(&chain);
+    let (mut series, _) = seen(&chain, &request(&chain));
     let sigma = |series: &MeasuredSeries, estimator| {
         let options = Options { estimator, ..Options::default() };
         let solution = identify(chain.clone(), std::slice::from_ref(series), &options).unwrap();
@@ -199,7 +228,7 @@ fn a_two_stage_result_states_what_is_not_known_of_the_size_of_the_plate() {
 fn circles_of_other_radii_doubt_no_plate() {
     let chain = kr6();
     let solved = |gain_m: f64| {
-        let (mut series, _) = seen(&chain);
+        let (mut series, _) = seen(&chain, &request(&chain));
         series.plate.markers.iter_mut().for_each(|m| m.outer_radius_m -= gain_m);
         identify(chain.clone(), &[series], &Options::default()).unwrap()
     };
