@@ -6,14 +6,14 @@ use crate::error::Code;
 /// Stops that are named.
 const NAMED: usize = 6;
 
-/// What the images say of postures that were computed.
+/// What images and trackers say of postures that were computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComputedPostures {
     /// Series with such poses.
     pub series: Vec<String>,
     /// Their stops.
     pub stops: usize,
-    /// Images at whose stops another posture is taken than that nearest to the stop before.
+    /// Stops, by the names of their images, at which another posture is taken than that nearest to the stop before.
     pub others: Vec<String>,
     /// True where other postures at many stops together fit as well.
     pub is_open: bool,
@@ -51,9 +51,9 @@ impl Kind for ComputedPostures {
 
     fn seen(&self) -> String {
         let others = match self.others.len() {
-            0 => "the images fit the postures nearest to those of the stops before".to_owned(),
+            0 => "what was seen fits the postures nearest to those of the stops before".to_owned(),
             count => format!(
-                "at {count} of {} stops the images fit another posture than that nearest to the stop before, which is taken: {}",
+                "at {count} of {} stops what was seen fits another posture than that nearest to the stop before, which is taken: {}",
                 self.stops,
                 some_of(&self.others, NAMED)
             ),

@@ -161,7 +161,7 @@ codes! {
         JointBeyondLimits "joint_beyond_limits" "readings are beyond the limits of the joint",
         PosesOfTool "poses_of_tool" "poses of a controller that are said to be of the flange are those of a tool",
         PosesInFrame "poses_in_frame" "poses of a controller that are said to be in the base are in another frame",
-        PosturesByImages "postures_by_images" "the images tell in which postures the poses of a controller were reached, or that they do not",
+        PosturesByImages "postures_by_images" "what was seen at the stops tells in which postures the poses of a controller were reached, or that it does not",
         PosturesFromPoses "postures_from_poses" "joint readings were computed from poses of the controller by inverse kinematics",
         ReadingsMissing "readings_missing" "no row has joint readings",
     }

@@ -1,6 +1,6 @@
 //! Identified series to a solution: the steps in their order, and in rounds where a better robot tells postures anew.
 
-use super::controller::computed_postures::{Before, Told, told_by_images};
+use super::controller::computed_postures::{Before, Told, told_by_seen};
 use super::controller::tool::tool_in_poses;
 use super::estimator::Estimator;
 use super::joint_fit::fit::JointFit;
@@ -90,7 +90,7 @@ fn told_postures(
     series: (&[MeasuredSeries], Before),
     options: &Options,
 ) -> (Vec<MeasuredSeries>, Option<Told>) {
-    let (told, found) = told_by_images(robot, series, &options.limits, |start| selected(start, options));
+    let (told, found) = told_by_seen(robot, series, &options.limits, |start| selected(start, options));
     (told.into_owned(), found)
 }
 

@@ -1,6 +1,6 @@
 //! A robot model judged by a series that it was not fitted to: camera, hand-camera offset and plate are fitted, the robot is not.
 
-use super::controller::computed_postures::{Before, told_by_images};
+use super::controller::computed_postures::{Before, told_by_seen};
 use super::joint_fit::unpredicted::nothing_held_out;
 use super::options::JointNoise;
 use super::photogrammetry::free_poses::free_poses_of;
@@ -30,7 +30,7 @@ pub struct JudgedImage {
 /// them for a worse one, and that by which they were computed tells none. Ids of plates that look the same when they are turned are settled, too.
 pub fn in_told_postures(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) -> Vec<MeasuredSeries> {
     let settled = turns::settled(robot, series, limits);
-    let (told, _) = told_by_images(robot, (&settled, Before::Nearest), limits, with_robot_held);
+    let (told, _) = told_by_seen(robot, (&settled, Before::Nearest), limits, with_robot_held);
     let mut told = told.into_owned();
     told.iter_mut().for_each(|s| s.postures.clear());
     told

@@ -205,8 +205,8 @@ impl BodyMeasurement {
         BodyTerms { cost, pp: jw * jacobian, bp: jw * residual, residual, squares, length, weight }
     }
 
-    /// Measured minus predicted, and the derivative of the prediction by its body twist.
-    fn residual(&self, predicted: &Pose) -> (Vector6<f64>, Matrix6<f64>) {
+    /// Measured minus predicted, m and rad (of a point the rotation is zero), and the derivative of the prediction by its body twist.
+    pub fn residual(&self, predicted: &Pose) -> (Vector6<f64>, Matrix6<f64>) {
         match &self.seen {
             BodySeen::Point(position) => {
                 let d = position - predicted.translation;

@@ -482,6 +482,66 @@ fn the_images_tell_in_which_posture_a_pose_was_reached() {
     assert!(restored[0].readings_are_computed());
 }
 
+/// A series of these poses of the controller without images, and what a tracker with this noise saw of the real robot at these readings.
+fn tracked(poses: &[(String, Pose)], readings: &[Vec<f64>], as_poses: bool) -> TempDir {
+    let folder = series("quaternion", "qx,qy,qz,qw", poses, quaternion);
+    for file in ["plate.toml", "plate.csv", "observations.csv"] {
+        fs::remove_file(folder.path().join(file)).unwrap();
+    }
+    let manifest = "format = 1\nbase = \"base_link\"\ntip = \"tool0\"\n[controller]\nrotation = \"quaternion\"\n";
+    fs::write(folder.path().join("series.toml"), manifest).unwrap();
+    let truth = truth();
+    let robot = truth.robot(&Inputs::read(&urdf(), &[dataset()], Ends::default()).unwrap().chain).unwrap();
+    let tracker = Pose::exp(&Vector6::new(2.5, 0.4, -0.3, 0.2, -0.1, 1.9)).inverse();
+    let target = Pose::exp(&Vector6::new(0.06, -0.03, 0.12, 0.4, 0.3, -0.2));
+    let mut dice = Dice::new(23);
+    let turned = if as_poses { ",qx,qy,qz,qw,sigma_m,sigma_rad" } else { ",sigma_m" };
+    let mut table = format!("stop,target,x_m,y_m,z_m{turned}\n");
+    for ((name, _), q) in poses.iter().zip(readings) {
+        let noise = Vector6::from_fn(|k, _| dice.normal(if k < 3 { TRACKER_M } else { TRACKER_RAD }));
+        let seen = (tracker * robot.base_from_tip(q) * target).perturbed(&noise);
+        let turned = if as_poses { quaternion(&seen) } else { Vec::new() };
+        let sigmas = if as_poses { vec![TRACKER_M, TRACKER_RAD] } else { vec![TRACKER_M] };
+        let cells: Vec<String> =
+            seen.xyz().into_iter().chain(turned).chain(sigmas).map(|v| format!("{v:.9}")).collect();
+        writeln!(table, "{name},target,{}", cells.join(",")).unwrap();
+    }
+    fs::write(folder.path().join(if as_poses { "poses.csv" } else { "points.csv" }), table).unwrap();
+    folder
+}
+
+const TRACKER_M: f64 = 3e-5;
+const TRACKER_RAD: f64 = 1e-4;
+
+/// Where no image sees a stop, what a tracker measured there tells its posture as images do.
+#[test]
+fn a_tracker_tells_in_which_posture_a_pose_was_reached() {
+    let (robot, readings, poses) = by_joints();
+    let chain = robot.chain;
+    let right = |found: Vec<&[f64]>| {
+        found.into_iter().zip(&readings).filter(|(found, read)| posture_difference(found, read) < 1e-3).count()
+    };
+    for as_poses in [true, false] {
+        let folder = tracked(&poses, &readings, as_poses);
+        let nearest = robotcal::identify::readings_of(&robotcal::series::read(folder.path()).unwrap(), &chain).unwrap();
+        let nearest = right(nearest.iter().flatten().map(Vec::as_slice).collect());
+        let inputs = Inputs::read(&urdf(), &[folder.path().to_path_buf()], Ends::default()).unwrap();
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        let calibration = Calibration::of(inputs.observe(&options.limits, &|_, _| ()).unwrap(), &options).unwrap();
+        let solution = calibration.solution();
+        let told = right(solution.series[0].stops.iter().filter_map(|s| s.readings.as_deref()).collect());
+        let all = readings.len();
+        println!("poses {as_poses}: nearest {nearest}, told {told} of {all}");
+        assert!(nearest < all / 2 && told + 2 >= all, "{nearest}, {told}");
+        let said = solution.findings.iter().find_map(|f| match f {
+            Finding::ComputedPostures(said) => Some(said),
+            _ => None,
+        });
+        let said = said.unwrap();
+        assert_eq!((said.stops, said.others.len(), said.is_open), (all, all - nearest, false), "{said:?}");
+    }
+}
+
 #[test]
 fn a_wrist_turned_over_at_all_stops_is_told_to_be_open() {
     let urdf = kr6_urdf();

@@ -1,8 +1,8 @@
-//! Which posture every pose of a controller means, by the images.
+//! Which posture every pose of a controller means, by what was seen at its stop: images, and bodies on the tip.
 //!
 //! A pose is reached in up to eight postures. The nominal robot is at the same place in all of them, the real one is not: with the derivatives
-//! `G_ic` of the camera pose at posture `c` of stop `i`, and `e_i` from the nominal pose to that of the images, wanted are the parameters `x` and
-//! the choice with the least
+//! `G_ic` of the camera pose, or of a body as a tracker sees it, at posture `c` of stop `i`, and `e_i` from the nominal one to that which was seen, wanted
+//! are the parameters `x` and the choice with the least
 //!
 //! ```text
 //! sum_i min_c (e_i - G_ic x)' V_ic^-1 (e_i - G_ic x) + x' P^-1 x
@@ -16,7 +16,7 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{DMatrix, DVector, Matrix6};
+use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -25,11 +25,13 @@ use crate::assess::Limits;
 use crate::diagnose::ComputedPostures;
 use crate::error::Result;
 use crate::fit::FreePoses;
+use crate::identify::bodies::start::start_bodies;
 use crate::identify::photogrammetry::free_poses::free_poses_of;
+use crate::identify::problem::build::build;
 use crate::identify::start::robot::{StartGiven, start_robot};
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::{LinearOrigins, Posture, Robot};
-use crate::problem::{Adjustment, MeasuredSeries, State, TakenFrom};
+use crate::problem::{Adjustment, Chained, MeasuredSeries, Problem, State, TakenFrom};
 use crate::stage::stage;
 
 /// Noise of the readings of the stops that are compared, rad or m.
@@ -56,8 +58,24 @@ pub(super) struct Compared {
     columns: Vec<usize>,
     /// Prior information of the parameters.
     pub prior: DVector<f64>,
-    /// Images of every stop.
-    pub stops: Vec<Vec<usize>>,
+    pub stops: Vec<SeenAt>,
+}
+
+/// What was seen at a stop.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SeenAt {
+    stop: usize,
+    /// Images by their indices.
+    pub images: Vec<usize>,
+    /// Measurements of bodies by their indices.
+    bodies: Vec<usize>,
+}
+
+impl SeenAt {
+    /// What images alone saw; `None` where there is none.
+    pub fn by_images(&self) -> Option<Self> {
+        (!self.images.is_empty()).then(|| Self { bodies: Vec::new(), ..self.clone() })
+    }
 }
 
 impl Compared {
@@ -83,51 +101,86 @@ impl Compared {
         limits: &Limits,
         hold: impl FnOnce(&mut Adjustment) -> Result<()>,
     ) -> Option<Self> {
-        let (mut adjustment, free, mut verdicts) = free_poses_of(robot, series, limits, hold).ok()?;
+        let has_images = series.iter().any(|s| s.stops.iter().any(|stop| !stop.observations.is_empty()));
+        let (mut adjustment, free, mut verdicts) = match has_images {
+            true => free_poses_of(robot, series, limits, hold).ok()?,
+            false => {
+                let mut start = build(robot, series, false, limits).ok()?;
+                hold(&mut start).ok()?;
+                let free = FreePoses::none(start.state.clone());
+                (start, free, Vec::new())
+            }
+        };
         start_robot(&mut adjustment, &free, StartGiven { series, groups: &[], limits }, &mut verdicts).ok()?;
+        // Where they do not fit, the joint fit says why, and the images tell by themselves.
+        let bodies_fit = start_bodies(&mut adjustment, series, limits).is_ok();
         let layout = &adjustment.problem.layout;
         let columns: Vec<usize> = (0..layout.theta_len()).filter(|&c| layout.columns[c].free).collect();
         let prior = columns.iter().map(|&c| layout.columns[c].prior_sigma.powi(-2));
         let prior = DVector::from_iterator(columns.len(), prior);
-        let mut by_stop: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        let mut by_stop: BTreeMap<usize, SeenAt> = BTreeMap::new();
         for i in adjustment.problem.used_on_robot() {
-            by_stop.entry(adjustment.problem.images[i].stop).or_default().push(i);
+            by_stop.entry(adjustment.problem.images[i].stop).or_default().images.push(i);
         }
-        let stops = by_stop.into_values().collect();
+        for (k, measured) in adjustment.problem.used_bodies().filter(|_| bodies_fit) {
+            by_stop.entry(measured.stop).or_default().bodies.push(k);
+        }
+        let stops = by_stop.into_iter().map(|(stop, seen)| SeenAt { stop, ..seen }).collect();
         Some(Self { adjustment, free, columns, prior, stops })
     }
 
-    /// `V^-1/2 G` and `V^-1/2 e` of the images of a stop at some readings, by the unknowns of a state.
+    /// `V^-1/2 G` and `V^-1/2 e` of what was seen at a stop at some readings, by the unknowns of a state.
     pub fn seen_at(
         &self,
         (state, origins): (&State, &LinearOrigins),
-        images: &[usize],
+        seen: &SeenAt,
         readings: &[f64],
     ) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let problem = &self.adjustment.problem;
-        let read = problem.stops[problem.images[*images.first()?].stop].posture.as_ref()?;
+        let read = problem.stops[seen.stop].posture.as_ref()?;
         let (posture, zeros) = (approached(read, readings), vec![0.0; readings.len()]);
-        let mut g = DMatrix::zeros(6 * images.len(), self.columns.len());
-        let mut e = DVector::zeros(6 * images.len());
-        for (k, &i) in images.iter().enumerate() {
+        let from = || TakenFrom::rigid(&posture, &zeros);
+        let of_image = |&i: &usize| {
             let pose = self.free.poses[i].as_ref()?;
-            let from = TakenFrom::rigid(&posture, &zeros);
-            let chained = state.chained_from(origins, &problem.layout, &problem.images[i], from)?;
-            let by_readings = chained.d_latent.columns(0, readings.len()) * JOINT_SIGMA;
-            let noise =
-                pose.covariance + Matrix6::from_column_slice((&by_readings * by_readings.transpose()).as_slice());
-            let root = noise.cholesky()?.l().try_inverse()?;
-            e.rows_mut(6 * k, 6).copy_from(&(root * (chained.pose.inverse() * pose.camera_from_plate).log()));
-            g.rows_mut(6 * k, 6).copy_from(&(root * chained.d_theta.select_columns(&self.columns)));
-        }
-        Some((g, e))
+            let chained = state.chained_from(origins, &problem.layout, &problem.images[i], from())?;
+            let e = (chained.pose.inverse() * pose.camera_from_plate).log();
+            let noise = DMatrix::from_column_slice(6, 6, pose.covariance.as_slice());
+            self.whitened(&chained, DMatrix::identity(6, 6), (DVector::from_column_slice(e.as_slice()), noise))
+        };
+        let of_body = |&k: &usize| {
+            let measured = &problem.body_measurements[k];
+            let chained = state.body_chained(origins, &problem.layout, measured, from())?;
+            let (e, by_pose) = measured.residual(&chained.pose);
+            let count = measured.seen.coordinates();
+            let by_pose = DMatrix::from_fn(count, 6, |row, column| by_pose[(row, column)]);
+            let sigma = |row: usize| if row < 3 { measured.sigma_m } else { measured.sigma_rad };
+            let noise = DMatrix::from_diagonal(&DVector::from_fn(count, |row, _| sigma(row).powi(2)));
+            self.whitened(&chained, by_pose, (DVector::from_fn(count, |row, _| e[row]), noise))
+        };
+        let all = seen.images.iter().map(of_image).chain(seen.bodies.iter().map(of_body));
+        let (g, e): (Vec<_>, Vec<_>) = all.collect::<Option<Vec<_>>>()?.into_iter().unzip();
+        let rows: Vec<_> = g.iter().flat_map(DMatrix::row_iter).collect();
+        (!rows.is_empty())
+            .then(|| (DMatrix::from_rows(&rows), DVector::from_vec(e.iter().flatten().copied().collect())))
+    }
+
+    /// Of a residual that depends on a pose, with the noise of what was seen and that of the readings.
+    fn whitened(
+        &self,
+        chained: &Chained,
+        by_pose: DMatrix<f64>,
+        (e, noise): (DVector<f64>, DMatrix<f64>),
+    ) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let by_readings = &by_pose * &chained.d_latent * JOINT_SIGMA;
+        let root = (noise + &by_readings * by_readings.transpose()).cholesky()?.l().try_inverse()?;
+        Some((&root * by_pose * chained.d_theta.select_columns(&self.columns), root * e))
     }
 }
 
-/// What the images say of one posture of a stop.
+/// What was seen at a stop says of one of its postures.
 struct Candidate {
     readings: Vec<f64>,
-    /// `V^-1/2 G` and `V^-1/2 e` of all images of the stop.
+    /// `V^-1/2 G` and `V^-1/2 e` of all that was seen there.
     g: DMatrix<f64>,
     e: DVector<f64>,
 }
@@ -170,7 +223,7 @@ struct Stops {
     prior: DVector<f64>,
 }
 
-/// What the postures of a series are before the images tell them.
+/// What the postures of a series are before they are told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::identify) enum Before {
     /// Those nearest to the stops before.
@@ -179,8 +232,8 @@ pub(in crate::identify) enum Before {
     Fitted,
 }
 
-/// The series with the postures that the images tell; unchanged where readings were read. `hold` holds the columns that are not to be fitted.
-pub(in crate::identify) fn told_by_images<'a>(
+/// The series with the postures that images and bodies tell; unchanged where readings were read. `hold` holds the columns that are not to be fitted.
+pub(in crate::identify) fn told_by_seen<'a>(
     robot: &Robot,
     (series, from): (&'a [MeasuredSeries], Before),
     limits: &Limits,
@@ -208,7 +261,7 @@ pub(in crate::identify) fn told_by_images<'a>(
     (Cow::Owned(told), Some(Told { stops: count, changed, is_open: chosen.is_open, undecided: chosen.undecided }))
 }
 
-/// What the images told of the postures.
+/// What was told of the postures.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::identify) struct Told {
     /// Stops whose poses were read.
@@ -239,7 +292,7 @@ impl Told {
 
 impl Stops {
     fn of(compared: &Compared, series: &[MeasuredSeries]) -> Option<Self> {
-        let of = |images: &Vec<usize>| stop(compared, series, images);
+        let of = |seen: &SeenAt| stop(compared, series, seen);
         let all: Vec<Stop> = compared.stops.par_iter().filter_map(of).collect();
         (!all.is_empty()).then_some(Self { all, prior: compared.prior.clone() })
     }
@@ -465,27 +518,38 @@ impl Stop {
     }
 }
 
-/// What the images of one stop say of its postures.
-fn stop(compared: &Compared, series: &[MeasuredSeries], images: &[usize]) -> Option<Stop> {
+/// What was seen at one stop says of its postures.
+fn stop(compared: &Compared, series: &[MeasuredSeries], seen: &SeenAt) -> Option<Stop> {
     let Adjustment { problem, state } = &compared.adjustment;
-    let row = |&i: &usize| {
-        let image = &problem.images[i];
-        let row = series[image.series].stops.iter().position(|s| s.image == image.name)?;
-        Some((image.series, row))
-    };
-    let rows: Vec<(usize, usize)> = images.iter().filter_map(row).collect();
-    let &(s, row) = rows.first()?;
+    let rows = rows_of(problem, series, seen);
+    let &(s, row) =
+        rows.iter().find(|(s, row)| series[*s].postures.get(*row).is_some_and(|p| !p.is_empty())).or(rows.first())?;
     let own = series[s].stops[row].readings.clone()?;
     let others = series[s].postures.get(row).cloned().unwrap_or_default();
     let origins = state.robot.linear_origins();
     let of = |readings: Vec<f64>| {
-        let (g, e) = compared.seen_at((state, &origins), images, &readings)?;
+        let (g, e) = compared.seen_at((state, &origins), seen, &readings)?;
         Some(Candidate { readings, g, e })
     };
     let candidates = std::iter::once(own).chain(others).map(of).collect::<Option<Vec<_>>>()?;
     let rows_of_g: Vec<_> = candidates.iter().flat_map(|c| c.g.row_iter()).collect();
     let across = DMatrix::from_rows(&rows_of_g).transpose();
     Some(Stop { rows, candidates, across })
+}
+
+/// Series and row of a stop, for every camera of its run.
+fn rows_of(problem: &Problem, series: &[MeasuredSeries], seen: &SeenAt) -> Vec<(usize, usize)> {
+    let of_image = |i: &usize| {
+        let image = &problem.images[*i];
+        Some((image.series, series[image.series].stops.iter().position(|s| s.image == image.name)?))
+    };
+    let of_body = |k: &usize| Some(problem.body_measurements[*k].read);
+    let first = seen.images.iter().find_map(of_image).or_else(|| seen.bodies.iter().find_map(of_body));
+    let Some((s, row)) = first else { return Vec::new() };
+    let run = |s: usize| series[s].run.as_deref().unwrap_or(&series[s].name);
+    let place = series[s].stops[row].row;
+    let own = (0..series.len()).filter(|&other| run(other) == run(s));
+    own.filter_map(|k| Some((k, series[k].stops.iter().position(|stop| stop.row == place)?))).collect()
 }
 
 /// A stop in another posture than that in which it was `read`, reached from the same stop before.

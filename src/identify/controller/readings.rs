@@ -1,6 +1,8 @@
 //! Poses of a controller to readings of a chain: in closed form where its joints are the coordinates of a pose, else by inverse kinematics
 //! of the nominal robot.
 
+use std::collections::BTreeSet;
+
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -12,7 +14,7 @@ use crate::model::inverse::{
     self, FARTHEST_STATED_RAD, FullTurns, POSTURE_STARTS, random_readings, reading_limits, solve_from,
 };
 use crate::model::robot::Robot;
-use crate::problem::MeasuredStop;
+use crate::problem::{MeasuredStop, SeenBody};
 use crate::series::{ControllerPoses, LengthUnit, Series};
 use crate::urdf::{Chain, JointKind};
 
@@ -70,28 +72,30 @@ pub fn postures_are_computed(series: &Series, chain: &Chain) -> bool {
     series.controller.is_some() && chain.pose_coordinates().is_none()
 }
 
-/// Where readings were computed: other postures that reach the pose of every stop, as near to its readings as full turns bring them. None of a
-/// pose where axes meet: they are without number.
+/// Where readings were computed: other postures that reach the pose of every stop at which an image, or something that measures bodies, saw anything,
+/// as near to its readings as full turns bring them. None of a pose where axes meet: they are without number.
 pub(in crate::identify) fn other_postures(
     series: &Series,
     chain: &Chain,
-    stops: &[MeasuredStop],
+    (stops, bodies): (&[MeasuredStop], &[SeenBody]),
 ) -> Vec<Vec<Vec<f64>>> {
     let poses = series.controller.as_ref().filter(|_| postures_are_computed(series, chain));
     let Some(poses) = poses else { return Vec::new() };
     let arm = Arm::of(chain);
-    let of = |((pose, stated), stop): ((&Option<Pose>, &Option<Vec<f64>>), &MeasuredStop)| match (pose, &stop.readings)
-    {
-        (Some(pose), Some(readings)) if stated.is_none() && !stop.observations.is_empty() => arm.others(pose, readings),
+    let measured: BTreeSet<usize> = bodies.iter().map(|body| body.stop).collect();
+    let of = |k: usize| match (&poses.base_from_flange[k], &poses.stated_deg[k], &stops[k].readings) {
+        (Some(pose), None, Some(readings)) if !stops[k].observations.is_empty() || measured.contains(&k) => {
+            arm.others(pose, readings)
+        }
         _ => Vec::new(),
     };
-    poses.base_from_flange.par_iter().zip(&poses.stated_deg).zip(stops).map(of).collect()
+    (0..stops.len()).into_par_iter().map(of).collect()
 }
 
 /// What to say of postures that were not read.
 pub(in crate::identify) fn notice(series: &Series, chain: &Chain) -> Option<Notice> {
-    let what = "has poses: the joint readings are those with which the robot of the URDF reaches them, in the posture that the images \
-                tell, else in that nearest to the stop before, and at the first stop nearest to the middle of the limits";
+    let what = "has poses: the joint readings are those with which the robot of the URDF reaches them, in the posture that images \
+                and trackers tell, else in that nearest to the stop before, and at the first stop nearest to the middle of the limits";
     let remedy = "see that they are those of the flange in the base (no tool, no user frame), and that the URDF is the model in the controller (of a corrected one the readings are wrong by the correction), or record \
                   joint readings (joints.csv): they know the posture, and no model plays a part then";
     postures_are_computed(series, chain)

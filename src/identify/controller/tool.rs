@@ -13,7 +13,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6, SymmetricEigen, Vector3, Vector6};
 use rayon::prelude::*;
 
-use super::computed_postures::{Compared, Knowledge};
+use super::computed_postures::{Compared, Knowledge, SeenAt};
 use crate::assess::Limits;
 use crate::diagnose::{PosesOf, ToolInPoses};
 use crate::error::Result;
@@ -59,8 +59,8 @@ struct Search<'a> {
     of: PosesOf,
     nominal: Robot,
     limits: Vec<(f64, f64)>,
-    /// Images of the stops that are compared, the readings that were taken, and the pose that was stated.
-    stops: Vec<(&'a [usize], Vec<f64>, Pose)>,
+    /// The stops that are compared as images saw them, the readings that were taken, and the pose that was stated.
+    stops: Vec<(SeenAt, Vec<f64>, Pose)>,
     equations: usize,
 }
 
@@ -83,18 +83,19 @@ impl<'a> Search<'a> {
     fn new(compared: &'a Compared, series: &[MeasuredSeries], robot: &Robot, of: PosesOf) -> Option<Self> {
         let nominal = Robot::nominal(robot.chain.clone());
         let problem = &compared.adjustment.problem;
-        let taken = |images: &'a Vec<usize>| {
-            let first = &problem.images[*images.first()?];
+        let taken = |seen: &SeenAt| {
+            let seen = seen.by_images()?;
+            let first = &problem.images[*seen.images.first()?];
             if !series[first.series].readings_are_computed() {
                 return None;
             }
             let posture = problem.stops[first.stop].posture.as_ref()?;
             let stated = nominal.base_from_tip(&posture.readings);
-            Some((images.as_slice(), posture.readings.clone(), stated))
+            Some((seen, posture.readings.clone(), stated))
         };
         let all: Vec<_> = compared.stops.iter().filter_map(taken).collect();
         let stops: Vec<_> = spread(all.len(), MOST_STOPS).map(|k| all[k].clone()).collect();
-        let equations = stops.iter().map(|(images, ..)| 6 * images.len()).sum();
+        let equations = stops.iter().map(|(seen, ..)| 6 * seen.images.len()).sum();
         let limits = reading_limits(&robot.chain);
         (!stops.is_empty()).then_some(Self { compared, of, nominal, limits, stops, equations })
     }
@@ -103,7 +104,7 @@ impl<'a> Search<'a> {
     fn state(&self, of: &Pose) -> State {
         let Adjustment { problem, state } = &self.compared.adjustment;
         let mut moved = state.clone();
-        for image in self.stops.iter().flat_map(|(images, ..)| *images).map(|i| &problem.images[*i]) {
+        for image in self.stops.iter().flat_map(|(seen, ..)| &seen.images).map(|i| &problem.images[*i]) {
             let moves_camera = (image.mount == CameraMount::Hand) == (self.of == PosesOf::Tool);
             match moves_camera {
                 true => moved.mountings[image.mounting] = *of * state.mountings[image.mounting],
@@ -119,13 +120,13 @@ impl<'a> Search<'a> {
         let state = self.state(&of);
         let origins = state.robot.linear_origins();
         let without = of.inverse();
-        let one = |(images, taken, stated): &(&[usize], Vec<f64>, Pose)| {
+        let one = |(seen, taken, stated): &(SeenAt, Vec<f64>, Pose)| {
             let flange = match self.of {
                 PosesOf::Tool => *stated * without,
                 PosesOf::Frame => of * *stated,
             };
             let readings = solve_from(&self.nominal, &self.limits, &flange, taken)?;
-            self.compared.seen_at((&state, &origins), images, &readings)
+            self.compared.seen_at((&state, &origins), seen, &readings)
         };
         self.stops.par_iter().map(one).collect()
     }

@@ -114,7 +114,7 @@ fn seen_at(
     // The detector measures centroids, whatever observations would mean.
     let centroid = found_size.is_some() || series.manifest.observations.point == CirclePoint::Centroid;
     let measured = measured_series(series, lens, size_px, centroid, stops);
-    let postures = other_postures(series, chain, &measured.stops);
+    let postures = other_postures(series, chain, (&measured.stops, &bodies));
     Ok(MeasuredWithNotices { series: MeasuredSeries { plate, bodies, lengths, postures, ..measured }, notices })
 }
 
@@ -150,8 +150,10 @@ fn bodies_at(
 ) -> Result<MeasuredWithNotices> {
     let bodies = seen_bodies(series, several);
     let lengths = seen_lengths(series, several, &bodies)?;
+    let stops = without_images(series, readings);
+    let postures = other_postures(series, chain, (&stops.stops, &bodies));
     Ok(MeasuredWithNotices {
-        series: MeasuredSeries { bodies, lengths, ..without_images(series, readings) },
+        series: MeasuredSeries { bodies, lengths, postures, ..stops },
         notices: notices_of(series, chain),
     })
 }
