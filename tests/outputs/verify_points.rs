@@ -440,12 +440,12 @@ fn points_that_do_not_tell_a_model_from_the_nominal_robot_are_a_doubt() {
         let mut command = Command::cargo_bin("robotcal").unwrap();
         command.args(["verify", "--joint-unit", "rad", "--urdf"]).arg(report.join("kuka_kr6_r900.calibrated.urdf"));
         command.arg("--compensation").arg(report.join("compensation.toml")).arg("--nominal").arg(kr6().0);
-        let found = command.arg("--points").arg(points).output().unwrap();
+        let found = command.args(["--point-sigma-m", "0.00005", "--points"]).arg(points).output().unwrap();
         let text = String::from_utf8(found.stdout).unwrap();
         println!("{text}{}", String::from_utf8_lossy(&found.stderr));
         (found.status.code(), codes(&text), text)
     };
-    let (exit, said, text) = judged(&neighbours(folder.path(), 0.03, 5e-5, false));
+    let (exit, said, text) = judged(&neighbours(folder.path(), 0.006, 5e-5, false));
     assert_eq!((exit, said), (Some(0), vec![Code::ModelsNotTold]));
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let number = |before: &str| -> f64 {

@@ -538,7 +538,7 @@ fn a_tracker_tells_in_which_posture_a_pose_was_reached() {
             _ => None,
         });
         let said = said.unwrap();
-        assert_eq!((said.stops, said.others.len(), said.is_open), (all, all - nearest, false), "{said:?}");
+        assert_eq!((said.stops, said.others.len(), said.is_open), (all, told - nearest, false), "{said:?}");
     }
 }
 
