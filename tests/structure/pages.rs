@@ -80,7 +80,7 @@ fn every_key_of_a_solution_stands_in_the_manual() {
     let shipped = fs::read_to_string(src().join("../reports/kr6_small/solution.json")).unwrap();
     let mut there = BTreeSet::new();
     keys(&serde_json::from_str(&shipped).unwrap(), &mut there);
-    assert!(there.len() > 200, "only {} keys", there.len());
+    assert!(there.len() > 150, "only {} keys", there.len());
     for file in ["solution_json", "bodies_record", "finding_record", "pose_record", "series_record"] {
         let text = fs::read_to_string(src().join(format!("output/solution/{file}.rs"))).unwrap();
         let fields = text.lines().filter_map(|l| l.trim().strip_prefix("pub ")?.split_once(": "));
