@@ -378,8 +378,8 @@ mod tests {
     #[test]
     fn a_median_is_given_up_only_where_it_is_not_below() {
         let (truth, mut pairs) = world(9);
-        for k in 0..9 {
-            pairs[k].chain.translation.x += 0.01 * (k + 1) as f64;
+        for (k, pair) in pairs.iter_mut().enumerate() {
+            pair.chain.translation.x += 0.01 * (k + 1) as f64;
         }
         for count in 1..=9 {
             let some = &pairs[..count];

@@ -34,9 +34,10 @@ pub struct SceneOptions {
     pub camera_radius_m: f64,
     /// Least distance, m.
     pub clearance_m: f64,
-    /// Height of the table, m, in the base frame; `None`: below the lowest plate, at most the foot of the robot.
+    /// Height of the table, m, in the base frame (of the link above both ends, where the base is carried); `None`: below the lowest plate that
+    /// stands still, at most the foot of the robot.
     pub table_z_m: Option<f64>,
-    /// Boxes in the base frame.
+    /// Boxes in the same frame.
     pub boxes: Vec<OrientedBox>,
     /// Links with collision geometry of their own, in place of capsules along the links that carry them.
     pub described: Vec<Capsule>,
@@ -68,9 +69,13 @@ const FOOT: usize = 1;
 #[derive(Debug, Clone)]
 pub struct Scene {
     robot: Robot,
+    /// What stands still where the base does not.
+    cell: Option<Cell>,
     capsules: Vec<Capsule>,
     /// Pairs of capsules that are compared.
     pairs: Vec<(usize, usize)>,
+    /// A fixed camera on a base that is carried.
+    on_base: Option<OrientedBox>,
     /// Boxes that stand still, by name.
     boxes: Vec<(String, OrientedBox)>,
     /// Plates that stand still, one for each placement; empty for a plate in the hand.
@@ -79,6 +84,23 @@ pub struct Scene {
     plates_in_hand: Vec<OrientedBox>,
     table_z_m: f64,
     clearance_m: f64,
+}
+
+/// The link above a base that joints carry and the arm.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    /// Last entry of the chain that is passed upwards.
+    entry: usize,
+    /// Moving joints before it.
+    order: usize,
+}
+
+impl Cell {
+    fn of(chain: &Chain) -> Option<Self> {
+        let entry = chain.climbed().checked_sub(1).filter(|_| chain.base_moves())?;
+        let order = chain.joints[..=entry].iter().filter(|j| j.kind != JointKind::Fixed).count();
+        Some(Self { entry, order })
+    }
 }
 
 /// The plate as a box in its own frame.
@@ -92,15 +114,17 @@ fn plate_box(plate: &Plate) -> OrientedBox {
     }
 }
 
-/// Capsules along the links, from each moving joint to the next and to the tip, where `described` has none.
+/// Capsules along the links, from each moving joint to the next and to the tip, where `described` has none. The link on which both arms
+/// stand is no arm.
 fn along_links(robot: &Robot, radius_m: f64, described: &[Capsule]) -> Vec<Capsule> {
+    let above = Cell::of(&robot.chain).map(|cell| cell.order);
     let joints = &robot.chain.joints;
     let foot = robot.chain.base_from_foot().map_or_else(Vector3::zeros, |foot| foot.translation);
     let mut all = Vec::new();
     let (mut carrier, mut order, mut end) = (None, 0, Pose::identity());
     let mut close = |carrier: Option<usize>, order: usize, end: &Pose| {
         let name = carrier.map_or("base".to_owned(), |k: usize| format!("link after {}", joints[k].name));
-        if !described.iter().any(|c| c.order == order) {
+        if above != Some(order) && !described.iter().any(|c| c.order == order) {
             let start = if carrier.is_none() { foot } else { Vector3::zeros() };
             let ends_m = [start, end.translation];
             all.push(Capsule { name, joint: carrier, order, ends_m, radius_m });
@@ -149,7 +173,8 @@ impl Scene {
         let moving = robot.chain.joints.iter().filter(|j| j.kind != JointKind::Fixed).count();
         let plate = plate_box(&setting.plate);
         let placed = setting.placements.iter().map(|p| plate.placed(&p.1)).collect();
-        let (mut boxes, mut plates, mut plates_in_hand) = (Vec::new(), Vec::new(), Vec::new());
+        let cell = Cell::of(&robot.chain);
+        let (mut on_base, mut boxes, mut plates, mut plates_in_hand) = (None, Vec::new(), Vec::new(), Vec::new());
         match setting.mount {
             CameraMount::Hand => {
                 let ends_m = [Vector3::zeros(), setting.mounting.translation];
@@ -163,16 +188,22 @@ impl Scene {
                 plates = placed;
             }
             CameraMount::Fixed => {
-                let half_m = Vector3::repeat(options.camera_radius_m);
-                boxes.push(("camera".to_owned(), OrientedBox { pose: setting.mounting, half_m }));
+                let camera = OrientedBox { pose: setting.mounting, half_m: Vector3::repeat(options.camera_radius_m) };
+                match cell {
+                    Some(_) => on_base = Some(camera),
+                    None => boxes.push(("camera".to_owned(), camera)),
+                }
                 plates_in_hand = placed;
             }
         }
         boxes.extend(options.boxes.iter().enumerate().map(|(k, b)| (format!("box {}", k + 1), *b)));
-        let lowest = plates.iter().flat_map(|p| p.corners()).map(|c| c.z).fold(floor_m(&robot.chain), f64::min);
+        let standing = plates.iter().filter(|_| cell.is_none());
+        let lowest = standing.flat_map(|p| p.corners()).map(|c| c.z).fold(floor_m(&robot.chain), f64::min);
         let pairs = compared(&capsules, options.clearance_m);
         Self {
             robot: robot.clone(),
+            cell,
+            on_base,
             pairs,
             capsules,
             boxes,
@@ -200,22 +231,33 @@ impl Scene {
                 return Some(format!("{} and {}", self.capsules[a].name, self.capsules[b].name));
             }
         }
-        let still = self.boxes.iter().map(|(name, b)| (name.as_str(), b));
+        let hit = |obstacle: &OrientedBox, ends: &[[Vector3<f64>; 2]], is_meant: &dyn Fn(usize) -> bool| {
+            let mut links = self.capsules.iter().zip(ends).filter(|(c, _)| is_meant(c.order));
+            links.find(|(c, e)| near(obstacle.distance_to_segment_m(&e[0], &e[1]), c, 0.0)).map(|(c, _)| c.name.clone())
+        };
+        let still_from_base = self.cell.map_or_else(Pose::identity, |cell| links[cell.entry].inverse());
+        let in_base = ends;
+        let ends: Vec<[Vector3<f64>; 2]> = in_base.iter().map(|e| e.map(|e| still_from_base.transform(&e))).collect();
+        let stands = self.cell.map_or(0, |cell| cell.order);
+        for (name, obstacle) in &self.boxes {
+            if let Some(link) = hit(obstacle, &ends, &|order| order != stands) {
+                return Some(format!("{link} and {name}"));
+            }
+        }
+        // What carries them touches them.
         let plate = self.plates.get(placement).map(|p| ("plate", p));
-        for (name, obstacle) in still.clone().chain(plate) {
-            for (c, e) in self.capsules.iter().zip(&ends).filter(|(c, _)| c.order > 0) {
-                if near(obstacle.distance_to_segment_m(&e[0], &e[1]), c, 0.0) {
-                    return Some(format!("{} and {name}", c.name));
-                }
+        for (name, obstacle) in self.on_base.iter().map(|camera| ("camera", camera)).chain(plate) {
+            if let Some(link) = hit(obstacle, &in_base, &|order| order > stands) {
+                return Some(format!("{link} and {name}"));
             }
         }
         let table = self.table_z_m + self.clearance_m;
-        for (c, e) in self.capsules.iter().zip(&ends).filter(|(c, _)| c.order > FOOT) {
+        for (c, e) in self.capsules.iter().zip(&ends).filter(|(c, _)| c.order.abs_diff(stands) > FOOT) {
             if e[0].z.min(e[1].z) - c.radius_m < table {
                 return Some(format!("{} and table", c.name));
             }
         }
-        let carried = self.plates_in_hand.get(placement)?.placed(links.last()?);
+        let carried = self.plates_in_hand.get(placement)?.placed(&(still_from_base * *links.last()?));
         self.plate_in_hand_collides(&carried, &ends, table)
     }
 

@@ -506,3 +506,51 @@ fn names_cannot_become_statements_of_the_planned_programs() {
         assert!(line.matches('"').count() == 2 && literal.len() <= 80 && !literal.contains('\\'), "{line}");
     }
 }
+
+const POSITIONER: &str = r#"
+  <link name="trunnion"/><link name="table"/>
+  <joint name="tilt" type="revolute"><parent link="base_link"/><child link="trunnion"/><origin xyz="0.55 0 0.3" rpy="0 0 0.3"/>
+    <axis xyz="0 1 0"/><limit lower="-0.5" upper="0.5" effort="0" velocity="1"/></joint>
+  <joint name="turn" type="revolute"><parent link="trunnion"/><child link="table"/><origin xyz="0.02 0.01 0.08" rpy="0 0 0"/>
+    <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="0" velocity="1"/></joint>
+"#;
+
+/// The plate lies on a table that a positioner turns: what carries it is in nobody's way, and the floor stands still.
+#[test]
+fn poses_are_planned_of_a_plate_on_a_positioner() {
+    let arm = robotcal::urdf::read(&urdf("kuka_kr6_r900")).unwrap();
+    let end = arm.text.rfind("</robot>").unwrap();
+    let text = format!("{}{POSITIONER}{}", &arm.text[..end], &arm.text[end..]);
+    let cell = robotcal::urdf::RobotDescription::from_text(&arm.path, text).unwrap();
+    let mut request = request("kuka_kr6_r900", 6);
+    let alone = request.setting.clone();
+    request.setting.robot = RobotModel::Rigid.robot(cell.chain(Some("table"), Some("tool0")).unwrap());
+    request.setting.placements = vec![("table".into(), Pose::from_xyz_rpy([0.0, 0.0, 0.02], [0.0; 3]))];
+    request.setting.joint_sigma = vec![3e-5; 8];
+    request.budget = Budget::default();
+    let planned = plan(&request).unwrap();
+    assert_eq!(planned.legs.len(), 6);
+    let (tip, setting) = (request.setting.robot.chain.joints.len() - 1, &request.setting);
+    for leg in &planned.legs {
+        let tip = frames(&setting.robot.chain, &planned.pool[leg.stop].readings)[tip];
+        let [mounting, placed] = [&setting.mounting, &setting.placements[0].1].map(isometry);
+        check_sight("positioner", &request, &((tip * mounting).inverse() * placed));
+    }
+    // An arm that comes too near to the floor does so however the table is turned.
+    let scene = SceneOptions { table_z_m: Some(-0.1), ..SceneOptions::default() };
+    let far = vec![("away".into(), Pose::from_xyz_rpy([0.0, 0.0, 10.0], [0.0; 3]))];
+    let by_arm = Scene::new(&Setting { placements: far, ..alone }, &scene);
+    let by_cell = Scene::new(setting, &scene);
+    let is_table = |hit: &Option<String>| hit.as_ref().is_some_and(|what| what.ends_with("and table"));
+    let mut hits = 0;
+    for k in 0..400 {
+        let turned = |joint: usize, most: f64| most * (1.7 * f64::from(k) + 2.3 * joint as f64).sin();
+        let own: Vec<f64> = (0..6).map(|joint| turned(joint, if joint == 1 { 0.8 } else { 1.2 })).collect();
+        let whole = [&[turned(7, 3.0), turned(6, 0.5)], own.as_slice()].concat();
+        let [arm, cell] = [by_arm.collision(&own, 0), by_cell.collision(&whole, 0)];
+        hits += usize::from(is_table(&cell));
+        assert!(!is_table(&cell) || is_table(&arm), "{k}: {cell:?} {arm:?}");
+        assert!(!is_table(&arm) || cell.is_some(), "{k}: {cell:?} {arm:?}");
+    }
+    assert!(hits > 20, "{hits}");
+}

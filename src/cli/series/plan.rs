@@ -140,10 +140,10 @@ pub struct PlanArgs {
     /// Travel at most: greatest joint motion from the middle posture, summed over the images, rad
     #[arg(long, value_name = "RAD", help_heading = "Search")]
     travel_rad: Option<f64>,
-    /// Box that is in the way, in the base frame: middle and edges x,y,z,a,b,c, m
+    /// Box that is in the way, in the base frame (of the link on which both stand, where joints carry the base): middle and edges x,y,z,a,b,c, m
     #[arg(long, value_name = "BOX", allow_hyphen_values = true, help_heading = "What is in the way")]
     r#box: Vec<String>,
-    /// Height of the table in the base frame, m [default: below plate and robot]
+    /// Height of the table in the same frame, m [default: below plate and robot]
     #[arg(long, value_name = "M", allow_hyphen_values = true, help_heading = "What is in the way")]
     table_z_m: Option<f64>,
     /// Least distance between what must not touch, mm
