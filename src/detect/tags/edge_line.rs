@@ -23,9 +23,7 @@
 use nalgebra::{Matrix2, SMatrix, Vector2};
 
 use super::edge_shape::PixelShape;
-use super::edge_sums::{
-    BLUR, Column, DARK, FAR_BLURS, FEW_PARAMETERS, Pixel, SHAPE, STEP, Shape, Sums, powers, skew, sums,
-};
+use super::edge_sums::{BLUR, Column, DARK, FAR_BLURS, FEW_PARAMETERS, Pixel, SHAPE, STEP, Shape, Sums, powers, sums};
 use crate::detect::Picture;
 use crate::detect::circles::normal_tail;
 use crate::detect::shared::{SATURATED, SYSTEMATIC_PX};
@@ -153,7 +151,6 @@ struct Fit {
     blur_px: f64,
     /// Whether what lies beside it is seen within.
     is_lit: bool,
-    state: Column,
 }
 
 impl EdgeLine {
@@ -179,7 +176,6 @@ impl EdgeLine {
                 dark: 0.0,
                 blur_px: 0.0,
                 is_lit: false,
-                state: Column::zeros(),
             },
         };
         let mut state = Column::zeros();
@@ -224,19 +220,6 @@ impl EdgeLine {
     /// Whether what lies beside the side was seen within its ink.
     pub fn is_lit(&self) -> bool {
         self.fit.is_lit
-    }
-
-    /// How askew its edge is between ink and paper, as a share of the step, with the variance; `None` where paper is clipped.
-    pub fn skew(&self, picture: &Picture, side: &Side, beside: impl Fn() -> Vec<Beside>) -> Option<(f64, f64)> {
-        let (from, to) = (Vector2::from(side.from), Vector2::from(side.to));
-        let length = (to - from).norm();
-        let mut pixels = self.band(picture, side, length, [self.fit.blur_px, 0.0]).ok()?;
-        if self.fit.is_lit {
-            self.lighten(&mut pixels, &beside(), self.fit.blur_px);
-        }
-        let is_clipped = pixels.iter().any(|p| p.saturated);
-        let sigmas = prior_sigmas(bends(picture), length, &self.fit.state, is_clipped);
-        if is_clipped { None } else { skew(&pixels, &self.fit.state, &sigmas) }
     }
 
     /// The side when its covariance is so many times as large.
@@ -486,7 +469,6 @@ fn iterate(
                 dark: state[DARK],
                 blur_px: blur,
                 is_lit: false,
-                state: *state,
             };
             return if noise < WORST * contrast { Ok(fit) } else { Err("disturbed surroundings") };
         }

@@ -42,8 +42,6 @@ pub struct Added {
 }
 
 impl PixelShape {
-    pub const NOTHING: Self = Self { strength: 0.0 };
-
     /// Of an edge with this unit vector across it, where paper is clipped.
     pub fn of(across: &Vector2<f64>, is_clipped: bool) -> Self {
         let strength = OF_PIXEL * (across.x.powi(4) + across.y.powi(4));

@@ -50,9 +50,8 @@ pub struct Sums {
 
 /// What a state says of a pixel.
 struct Said {
-    /// Blurs beside the edge, and the normal density there.
+    /// Blurs beside the edge.
     u: f64,
-    phi: f64,
     step: f64,
     value: f64,
     row: Column,
@@ -91,7 +90,7 @@ impl Said {
             p.x,
             p.x * p.x,
         ]);
-        Self { u, phi, step, value: dark + step * share, row, by_k }
+        Self { u, step, value: dark + step * share, row, by_k }
     }
 }
 
@@ -128,29 +127,4 @@ pub fn sums(pixels: &[Pixel], state: &Column, shape: PixelShape, full_scale: f32
         }
     }
     out
-}
-
-/// Coefficient of `h (u^2 - 1) phi(u)` in the residuals, once all parameters with these prior sigmas have taken their part, and its variance.
-pub fn skew(pixels: &[Pixel], state: &Column, sigmas: &[(usize, f64)]) -> Option<(f64, f64)> {
-    let (mut normal, mut gradient, mut by_skew) = (Normal::zeros(), Column::zeros(), Column::zeros());
-    let (mut square, mut told, mut left) = (0.0, 0.0, 0.0);
-    let blur = state[BLUR].exp();
-    for p in pixels {
-        let Said { u, phi, step, value, row, .. } = Said::of(p, state, blur, PixelShape::NOTHING);
-        let (term, residual) = (step * (u * u - 1.0) * phi, p.value - value);
-        add_square(&mut normal, &row);
-        gradient += row * residual;
-        by_skew += row * term;
-        square += residual * residual;
-        told += term * residual;
-        left += term * term;
-    }
-    let noise = square / (pixels.len().checked_sub(FEW_PARAMETERS)?.max(1)) as f64;
-    for (k, sigma) in sigmas {
-        normal[(*k, *k)] += noise / (sigma * sigma);
-    }
-    let part = normal.cholesky()?.solve(&by_skew);
-    let own = left - part.dot(&by_skew);
-    let (value, variance) = ((told - part.dot(&gradient)) / own, noise / own);
-    (own > 0.0 && value.is_finite() && variance.is_finite()).then_some((value, variance))
 }

@@ -51,9 +51,9 @@ const MOST_LOOKS: usize = 5;
 const UNLIKE_PX: f64 = 0.01;
 const UNLIKE_SHARE: f64 = 0.03;
 /// Growth that nothing tells, as a share of the blur: that of the light to the power of 1 / 2.2 for ink that reflects 3 to 6 % of the paper.
-const OF_ENCODING: f64 = 0.4;
+const OF_ENCODING: f64 = 0.43;
 /// Square of the standard error of a median over that of a mean.
-pub(super) const OF_MEDIAN: f64 = std::f64::consts::FRAC_PI_2;
+const OF_MEDIAN: f64 = std::f64::consts::FRAC_PI_2;
 
 /// By how much ink has grown.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,7 +8,7 @@
 //!
 //! ```text
 //! quads (quadrilaterals) -> code, scan (what is written in them) -> layout (do the neighbours agree)
-//!         -> edge_line, edge_sums, edge_shape, beside, misfit (sides, and what disturbs them) -> code_edges, growth, encoding (how far ink reaches beyond its place)
+//!         -> edge_line, edge_sums, edge_shape, beside, misfit (sides, and what disturbs them) -> code_edges, growth (how far ink reaches beyond its place)
 //!         -> pipeline (the stages in their order) -> seen (what stands there instead)
 //! ```
 
@@ -18,7 +18,6 @@ mod code_edges;
 mod edge_line;
 mod edge_shape;
 mod edge_sums;
-mod encoding;
 mod growth;
 pub(super) mod layout;
 mod misfit;

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::beside::Printed;
 use super::code::{Reader, SURE_BITS};
 use super::edge_line::{ENDS_SPARE_PX, EdgeLine, Measured, Side};
-use super::encoding::{self, Askew, decoded};
 use super::growth::{self, Growth, InPicture, Outlined};
 use super::layout::{Layout, Tagged};
 use super::misfit::Usual;
@@ -230,7 +229,7 @@ impl<'a> Board<'a> {
         let own = self.grown(found, &sides);
         let known = InPicture::of(&own.values().copied().collect::<Vec<_>>());
         let blur_px = median(sides.values().flatten().flatten().map(EdgeLine::blur_px)).unwrap_or(0.0);
-        let untold = if known.is_some() { Growth::untold(0.0, 0.0) } else { self.untold(found, &sides, blur_px) };
+        let untold = Growth::untold(blur_px, self.smoothing_px);
         let of_place = |place: &usize| match known.map(|known| known.with(own.get(place).copied())) {
             None => untold,
             Some(growth) if self.tags.print == TagPrint::Kalibr => growth,
@@ -336,27 +335,6 @@ impl<'a> Board<'a> {
         };
         let whole = of_code(true);
         if whole.is_empty() { of_code(false) } else { whole }
-    }
-
-    /// How far ink reaches beyond its place where no tag says it.
-    fn untold(&self, found: &Found, sides: &Sides, blur_px: f64) -> Growth {
-        let untold = Growth::untold(blur_px, self.smoothing_px);
-        let Some(light) = decoded(self.picture) else { return untold };
-        let askew = |(place, four): (&usize, &[Measured; 4])| self.askew(&light, *place, &found[place], four);
-        let sides: Vec<Askew> = sides.iter().flat_map(askew).collect();
-        encoding::growth(&sides).map_or(untold, |growth| growth.beside(&untold))
-    }
-
-    /// How askew the sides of a tag are, and how far they lie elsewhere in a decoded copy of the picture.
-    fn askew(&self, light: &Picture, place: usize, corners: &Quad, sides: &[Measured; 4]) -> Vec<Askew> {
-        let (printed, of_light) = (self.print_of(place), self.sides(light, place, corners));
-        let of_side = |k: usize| {
-            let (side, beside) = (self.side(corners, k), || printed.beside(corners, k));
-            let (line, lit) = (sides[k].ok()?, of_light[k].ok()?);
-            let (as_is, decoded) = (line.skew(self.picture, &side, beside)?, lit.skew(light, &side, beside)?);
-            Some(Askew { as_is, decoded, moved_px: line.step_to(&lit) })
-        };
-        (0..4).filter_map(of_side).collect()
     }
 
     /// What the code of a tag says, whose corners have these covariances.
