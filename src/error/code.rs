@@ -236,7 +236,7 @@ codes! {
         MessagesUnreadable "messages_unreadable" "messages of a topic cannot be read",
         MessagesUnstamped "messages_unstamped" "messages have no stamp",
         ClocksApart "clocks_apart" "images and joint states were not taken at the same time",
-        ClockSetBack "clock_set_back" "the times of a recording go back: a clock was set",
+        ClockSetBack "clock_set_back" "the times of a recording or of rows go back: a clock was set, or began anew",
         ImagesDelayed "images_delayed" "images arrive later or earlier than joint states of the same stamp",
         ImageDelayFound "image_delay_found" "motion in the images tells of a delay, which is taken off",
         ImageDelayUnchecked "image_delay_unchecked" "motion in the images does not tell their delay",

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::controller_poses::{ControllerPoses, ReadOtherwise};
 use super::inputs::InputFile;
-use super::joints::{DEFAULT_PLACEMENT, SeriesStop, Stops, key_column, order_of_visiting, placement, stop_name};
+use super::joints::{DEFAULT_PLACEMENT, OrderOfTimes, SeriesStop, Stops, key_column, placement, stop_name};
 use super::quaternion::quaternion;
 use super::rotation_kind::RotationKind;
 use super::stop_index::{position, position_columns};
@@ -84,7 +84,7 @@ fn from_table(table: &Table, kind: RotationKind) -> Result<(Stops, ControllerPos
         return Err(Error::new(Code::FileEmpty, table.place_of_header(), "has no row with a pose", remedy));
     }
     refuse_units(table, kind, &known)?;
-    if let Some(order) = order_of_visiting(&stops) {
+    if let OrderOfTimes::Sorted(order) = OrderOfTimes::of(&stops) {
         (stops, poses) = order.into_iter().map(|k| (stops[k].clone(), poses[k].clone())).unzip();
     }
     let stops = Stops { key, stops, ..Stops::default() };

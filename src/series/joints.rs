@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::InputFile;
 use super::table::{Row, Table};
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Notice, Result};
 
 /// The placement of a series that names none.
 pub const DEFAULT_PLACEMENT: &str = "placement_0";
@@ -121,7 +121,7 @@ impl Stops {
             let remedy = format!("give one row for every {}", columns.key.column());
             return Err(Error::new(Code::FileEmpty, table.place_of_header(), "has no rows", remedy));
         }
-        if let Some(order) = order_of_visiting(&stops) {
+        if let OrderOfTimes::Sorted(order) = OrderOfTimes::of(&stops) {
             stops = order.into_iter().map(|k| stops[k].clone()).collect();
         }
         let named = |columns: &[usize]| columns.iter().map(|&c| table.headers[c].clone()).collect::<Vec<_>>();
@@ -129,9 +129,24 @@ impl Stops {
         Ok(Self { joints: named(&columns.joints), key: columns.key, torque_joints, stops })
     }
 
-    /// True where the rows of the file stand in another order than the stops, which is that of their times.
-    pub fn are_sorted_by_time(&self) -> bool {
-        !self.stops.iter().is_sorted_by_key(|s| s.line)
+    /// What is to be said of their order and their times.
+    pub(super) fn order_notice(&self, table: &Path) -> Option<Notice> {
+        let is_untold = matches!(OrderOfTimes::of(&self.stops), OrderOfTimes::Untold);
+        let is_sorted = !self.stops.iter().is_sorted_by_key(|s| s.line);
+        let (code, what, remedy) = match (is_untold, is_sorted) {
+            (false, false) => return None,
+            (false, true) => (
+                Code::RowsByTime,
+                "its rows stand in another order than their times (time_s): the stops are taken as visited in the order of time",
+                "remove the column where it holds something else",
+            ),
+            (true, _) => (
+                Code::ClockSetBack,
+                "its times (time_s) go back or are the same, as those of a clock that began anew: the stops are taken as visited in the order of the rows",
+                "give times of one clock, or remove the column; where the rows are in no order, write order = \"unknown\" under [robot]",
+            ),
+        };
+        Some(Notice::new(code, table.display(), what, remedy))
     }
 
     /// Index of the stop of that name.
@@ -231,12 +246,34 @@ impl Columns {
     }
 }
 
-/// Indices of stops in the order of their times; `None` where not all have one, or they stand in that order.
-pub(super) fn order_of_visiting(stops: &[SeriesStop]) -> Option<Vec<usize>> {
-    let times: Vec<f64> = stops.iter().map(|s| s.time_s).collect::<Option<_>>()?;
-    let mut order: Vec<usize> = (0..times.len()).collect();
-    order.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
-    (!order.is_sorted()).then_some(order)
+/// What the times of stops say of the order of visiting.
+pub(super) enum OrderOfTimes {
+    /// The rows stand in it, or not all have a time.
+    AsWritten,
+    /// It is this one.
+    Sorted(Vec<usize>),
+    /// A clock began anew, or two stops have one time.
+    Untold,
+}
+
+/// Stops of one clock, at least: rows that were put in another order make shorter runs of growing times.
+const STOPS_OF_A_CLOCK: usize = 4;
+
+impl OrderOfTimes {
+    pub fn of(stops: &[SeriesStop]) -> Self {
+        let Some(times) = stops.iter().map(|s| s.time_s).collect::<Option<Vec<f64>>>() else { return Self::AsWritten };
+        let mut order: Vec<usize> = (0..times.len()).collect();
+        order.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
+        let back = times.windows(2).filter(|w| w[1] < w[0]).count();
+        if back == 0 {
+            return Self::AsWritten;
+        }
+        let is_twice = order.windows(2).any(|w| times[w[0]] == times[w[1]]);
+        // In the order of time the runs of rows follow each other where they are of one clock.
+        let changes = order.windows(2).filter(|w| w[1] != w[0] + 1).count();
+        let is_begun_anew = (back + 1) * STOPS_OF_A_CLOCK <= times.len() && changes > back;
+        if is_twice || is_begun_anew { Self::Untold } else { Self::Sorted(order) }
+    }
 }
 
 /// The column that names the stops, and what it names.

@@ -10,7 +10,7 @@ use super::controller_poses::ControllerPoses;
 use super::image_file;
 use super::inputs::InputFile;
 use super::joints::{SeriesStop, StopKey, Stops};
-use super::manifest::Manifest;
+use super::manifest::{Manifest, StopOrder};
 use super::measurement_series::{Series, Source, file_name, own_manifest};
 use super::observation_file;
 use super::plate::Plate;
@@ -105,10 +105,9 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     } else {
         (stops, controller) = stops_of(folder, &manifest, &manifest_path, &mut inputs)?;
         let table = folder.join(controller_file::table_of_stops(folder));
-        notices.extend(stops.are_sorted_by_time().then(|| {
-            let what = "its rows stand in another order than their times (time_s): the stops are taken as visited in the order of time";
-            Notice::new(Code::RowsByTime, table.display(), what, "remove the column where it holds something else")
-        }));
+        if manifest.robot.order == StopOrder::Visited {
+            notices.extend(stops.order_notice(&table));
+        }
         spatial = SpatialFiles::read(folder, &stops, &mut inputs, &mut notices)?;
         if by_cameras {
             Source::NoImages

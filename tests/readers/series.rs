@@ -196,6 +196,17 @@ fn stops_were_visited_in_the_order_of_their_times() {
     let (as_written, by_time) = (vec![a.clone(), b.clone()], vec![b, a]);
     assert_eq!(visited(timed), (by_time, true));
     assert_eq!(visited(&timed.replace("12.5", "2.5")), (as_written.clone(), false));
+    // A clock that began anew: two runs of four stops each, one after the other.
+    let runs: String =
+        (0..8).map(|k| format!("{k}.png,0.{k},1,0,{}\n", if k < 4 { k as f64 } else { k as f64 - 3.5 })).collect();
+    let text = format!("image,j1,j2,x,time_s\n{runs}");
+    let images: Vec<String> = (0..8).map(|k| format!("images/{k}.png")).collect();
+    let files: Vec<(&str, &str)> =
+        images.iter().map(|image| (image.as_str(), "")).chain([("joints.csv", text.as_str())]).collect();
+    let series = read(series_with(&files).path()).unwrap();
+    assert!(series.stops.stops.iter().is_sorted_by_key(|s| s.line));
+    let codes: Vec<Code> = series.notices.iter().map(|n| n.code).collect();
+    assert!(codes.contains(&Code::ClockSetBack) && !codes.contains(&Code::RowsByTime), "{codes:?}");
     // Where a time is missing, or all are the same, nothing is told.
     assert_eq!(visited(&timed.replace("12.5", "")), (as_written.clone(), false));
     assert_eq!(visited(&timed.replace("12.5", "3")), (as_written, false));

@@ -120,7 +120,6 @@ fn is_information(code: Code) -> bool {
             | Code::ObservationsMissing
             | Code::PlatesAlike
             | Code::RepeatabilityUnused
-            | Code::RowsByTime
             | Code::SecondArmRenamed
             | Code::TipChosen
             | Code::UrdfUnlimited
