@@ -53,11 +53,6 @@ impl Gain<'_> {
         format!("{:.0} % of the nominal error ({:.0} to {:.0} %)", 100.0 * value, 100.0 * low, 100.0 * high)
     }
 
-    /// Whether the model may as well be better as worse.
-    fn is_open(&self) -> bool {
-        self.ratio.low < 1.0 && self.ratio.high >= 1.0
-    }
-
     /// How many of what was measured tell two models apart that differ by so much, where the better one misses so much: by the 95 % interval of
     /// the ratio, each of one degree of freedom.
     fn needed(apart_m: f64, rms_m: f64, limits: &Limits) -> f64 {
@@ -65,10 +60,22 @@ impl Gain<'_> {
         (FITTED + (NORMAL_95 / gain).powi(2)).ceil().max(limits.scatter_images as f64)
     }
 
-    /// What the measurement does not tell.
-    fn not_told(&self, (urdf, rms_m): (&Path, f64), stated: &Stated, limits: &Limits) -> Option<FileFinding> {
-        let Self { nominal, of, at: (readings, on_tip), .. } = self;
+    /// What the measurement does not tell: the model may as well be better as worse, or differs from the nominal robot here by less than it is
+    /// expected to miss, so that either may come nearer by chance.
+    fn not_told(
+        &self,
+        (urdf, rms_m): (&Path, f64),
+        (stated, expected): (&Stated, &Expectation),
+        limits: &Limits,
+    ) -> Option<FileFinding> {
+        let Self { nominal, of, at: (readings, on_tip), ratio } = self;
+        if ratio.high < 1.0 {
+            return None;
+        }
         let [here_m, at_stops_m] = stated.apart_from(nominal, on_tip, readings)?;
+        if ratio.low >= 1.0 && here_m >= expected.rms_m {
+            return None;
+        }
         let needed = Self::needed(at_stops_m, rms_m, limits);
         let [here, at_stops, mm] = [here_m, at_stops_m, rms_m].map(|m| 1e3 * m);
         let text = format!(
@@ -94,8 +101,8 @@ impl Reasons {
         let exceeded = stated.as_ref().and_then(|(s, expected)| exceeded((urdf, *rms_m), &s.path, *expected, limits));
         if let Some(gain) = gain {
             // Where the model misses no more than it should, it is no worse than it says.
-            let within = stated.as_ref().filter(|_| gain.is_open() && exceeded.is_none());
-            match within.and_then(|(s, _)| gain.not_told((urdf, *rms_m), s, limits)) {
+            let within = stated.as_ref().filter(|_| exceeded.is_none());
+            match within.and_then(|(s, expected)| gain.not_told((urdf, *rms_m), (s, expected), limits)) {
                 Some(not_told) => self.findings.push(not_told),
                 None => self.add_gain(gain, limits),
             }
