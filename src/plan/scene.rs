@@ -262,25 +262,42 @@ impl Scene {
                 return Some(format!("{} and table", c.name));
             }
         }
+        if self.cell.is_some() {
+            let on_base = self.plates.get(placement).map(|p| ("plate", p)).into_iter();
+            for (name, carried) in on_base.chain(self.on_base.iter().map(|camera| ("camera", camera))) {
+                if let Some(other) = self.still_near(&carried.placed(&still_from_base), table) {
+                    return Some(format!("{name} and {other}"));
+                }
+            }
+        }
         let carried = self.plates_in_hand.get(placement)?.placed(&(still_from_base * *links.last()?));
         self.plate_in_hand_collides(&carried, &ends, table)
     }
 
+    /// The table or the box that a carried body comes too near to.
+    fn still_near(&self, body: &OrientedBox, table: f64) -> Option<&str> {
+        if body.corners().iter().any(|c| c.z < table) {
+            return Some("table");
+        }
+        // Corners and middle against boxes: a plate is thin, and a box it would cut through elsewhere reaches the arm first.
+        let probes = body.corners().into_iter().chain([body.pose.translation]);
+        let hit = |b: &OrientedBox| {
+            probes
+                .clone()
+                .any(|p| b.distance_m(&p) < self.clearance_m || body.distance_m(&b.pose.translation) < self.clearance_m)
+        };
+        self.boxes.iter().find(|(_, b)| hit(b)).map(|(name, _)| name.as_str())
+    }
+
     /// The plate in the hand against table, boxes and all links but the two that carry it.
     fn plate_in_hand_collides(&self, plate: &OrientedBox, ends: &[[Vector3<f64>; 2]], table: f64) -> Option<String> {
-        if plate.corners().iter().any(|c| c.z < table) {
-            return Some("plate and table".into());
-        }
         let last = self.capsules.iter().map(|c| c.order).max()?;
         for (c, e) in self.capsules.iter().zip(ends).filter(|(c, _)| c.order + 1 < last) {
             if plate.distance_to_segment_m(&e[0], &e[1]) < c.radius_m + self.clearance_m {
                 return Some(format!("{} and plate", c.name));
             }
         }
-        // Corners and middle against boxes: a plate is thin, and a box it would cut through elsewhere reaches the arm first.
-        let probes = plate.corners().into_iter().chain([plate.pose.translation]);
-        let hit = |b: &OrientedBox| probes.clone().any(|p| b.distance_m(&p) < self.clearance_m);
-        self.boxes.iter().find(|(_, b)| hit(b)).map(|(name, _)| format!("plate and {name}"))
+        self.still_near(plate, table).map(|other| format!("plate and {other}"))
     }
 
     /// True where the straight way between two joint vectors is free, checked every `step` (rad or m of any joint).

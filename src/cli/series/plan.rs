@@ -140,7 +140,7 @@ pub struct PlanArgs {
     /// Travel at most: greatest joint motion from the middle posture, summed over the images, rad
     #[arg(long, value_name = "RAD", help_heading = "Search")]
     travel_rad: Option<f64>,
-    /// Box that is in the way, in the base frame (of the link on which both stand, where joints carry the base): middle and edges x,y,z,a,b,c, m
+    /// Box that is in the way, in the base frame (where joints carry the base: of the link that carries them and the arm): middle and edges x,y,z,a,b,c, m
     #[arg(long, value_name = "BOX", allow_hyphen_values = true, help_heading = "What is in the way")]
     r#box: Vec<String>,
     /// Height of the table in the same frame, m [default: below plate and robot]
