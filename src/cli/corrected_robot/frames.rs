@@ -110,7 +110,10 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     findings.extend(mirrored.map(|joints| mirror_image_fits(&joints, &subject)));
     findings.extend(from_below(robot.exported(), (&fitted, &touches), &found.limits, &subject));
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
-    findings.extend(carried(robot.exported(), frames.work.as_ref().map(|w| w.name.as_str()), &subject));
+    let is_carried = carried(robot.exported(), frames.work.as_ref().map(|w| w.name.as_str()), &subject);
+    let work = frames.work.clone().filter(|_| is_carried.is_none());
+    let of_controller = Frames { work, ..frames.clone() };
+    findings.extend(is_carried);
     let robot_record = RobotOfFrames {
         solution: InputFile::of_file(&args.from)?,
         name: record.robot.name.clone(),
@@ -124,7 +127,7 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
         findings: findings.clone(),
         ..record_of((&fitted, &touches), robot_record, placement)
     };
-    let mut files = frame_files::files(&frames);
+    let mut files = frame_files::files(&of_controller);
     let urdf = corrected_urdf(&record, &found, &in_the_base(&frames, &record, &fitted))?;
     files.insert(format!("{}.frames.urdf", folder_name(std::slice::from_ref(&record.robot.name))), urdf.into_bytes());
     files.insert(FILE_NAME.into(), frames_record::to_bytes(&made)?);

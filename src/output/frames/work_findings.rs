@@ -53,7 +53,7 @@ pub fn carried(robot: &Robot, work: Option<&str>, subject: &str) -> Option<FileF
     let work = work.filter(|_| robot.chain.base_moves())?;
     let base = &robot.chain.base;
     let text = format!(
-        "{work} is stated in {base}, which joints of the robot move: it goes with {base}, as a work object on a positioner does. One that stands still is found by touches in a solution whose base stands still (identify --base)"
+        "{work} is stated in {base}, which joints of the robot move: it goes with {base}, as a work object on a positioner does, and stands in frames.json and in the URDF alone: frames of a controller stand still. One that stands still is found by touches in a solution whose base stands still (identify --base)"
     );
     Some(FileFinding::new(Code::WorkCarried, Weight::Note, subject, [], text))
 }
