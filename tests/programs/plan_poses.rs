@@ -5,7 +5,7 @@ use std::process::Command;
 
 use crate::said::assert_says;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use robotcal::geom::Pose;
+use robotcal::geom::{OrientedBox, Pose};
 use robotcal::identify::RobotModel;
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::plan::candidates::CandidateOptions;
@@ -543,6 +543,9 @@ fn poses_are_planned_of_a_plate_on_a_positioner() {
         Scene::new(setting, &SceneOptions { table_z_m: Some(z), ..SceneOptions::default() })
     };
     let [by_arm, by_cell, without] = [above(&alone, -0.1), above(setting, -0.1), above(setting, -10.0)];
+    // A box where the plate lies, and nowhere else.
+    let at_plate = OrientedBox { pose: Pose::from_xyz_rpy([0.57, 0.01, 0.4], [0.0; 3]), half_m: Vector3::repeat(0.01) };
+    let boxed = Scene::new(setting, &SceneOptions { boxes: vec![at_plate], ..SceneOptions::default() });
     let (mut free, mut hits) = (0, 0);
     for k in 0..400 {
         let turned = |joint: usize, most: f64| most * (1.7 * f64::from(k) + 2.3 * joint as f64).sin();
@@ -551,6 +554,7 @@ fn poses_are_planned_of_a_plate_on_a_positioner() {
         if without.collision(&whole, 0).is_none() {
             let [arm, cell] = [by_arm.collision(&own, 0), by_cell.collision(&whole, 0)];
             assert_eq!(arm, cell, "{k}");
+            assert!(boxed.collision(&whole, 0).is_some(), "{k}");
             free += usize::from(arm.is_none());
             hits += usize::from(arm.is_some());
         }
