@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::robots::positioner;
 use crate::said::assert_says;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use robotcal::geom::{OrientedBox, Pose};
@@ -507,20 +508,12 @@ fn names_cannot_become_statements_of_the_planned_programs() {
     }
 }
 
-const POSITIONER: &str = r#"
-  <link name="trunnion"/><link name="table"/>
-  <joint name="tilt" type="revolute"><parent link="base_link"/><child link="trunnion"/><origin xyz="0.55 0 0.3" rpy="0 0 0.3"/>
-    <axis xyz="0 1 0"/><limit lower="-0.5" upper="0.5" effort="0" velocity="1"/></joint>
-  <joint name="turn" type="revolute"><parent link="trunnion"/><child link="table"/><origin xyz="0.02 0.01 0.08" rpy="0 0 0"/>
-    <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="0" velocity="1"/></joint>
-"#;
-
 /// The plate lies on a table that a positioner turns: what carries it is in nobody's way, and the floor stands still.
 #[test]
 fn poses_are_planned_of_a_plate_on_a_positioner() {
     let arm = robotcal::urdf::read(&urdf("kuka_kr6_r900")).unwrap();
     let end = arm.text.rfind("</robot>").unwrap();
-    let text = format!("{}{POSITIONER}{}", &arm.text[..end], &arm.text[end..]);
+    let text = format!("{}{}{}", &arm.text[..end], positioner(0.55, 0.5), &arm.text[end..]);
     let cell = robotcal::urdf::RobotDescription::from_text(&arm.path, text).unwrap();
     let mut request = request("kuka_kr6_r900", 6);
     let alone = request.setting.clone();

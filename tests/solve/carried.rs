@@ -17,17 +17,14 @@ use robotcal::urdf::{BASE_FROM_BASE, Chain, RobotDescription, patch_origins};
 
 use crate::coverage::world;
 use crate::measured_worlds::{Kind, World, readings, truth};
-use crate::robots::kr6_urdf;
+use crate::robots::{kr6_urdf, positioner};
 use crate::said::assert_says;
 use crate::support::small::Dice;
 
-const POSITIONER: &str = r#"
-  <link name="trunnion"/><link name="table"/>
-  <joint name="tilt" type="revolute"><parent link="base_link"/><child link="trunnion"/><origin xyz="0.75 0 0.3" rpy="0 0 0.3"/>
-    <axis xyz="0 1 0"/><limit lower="-0.8" upper="0.8" effort="0" velocity="1"/></joint>
-  <joint name="turn" type="revolute"><parent link="trunnion"/><child link="table"/><origin xyz="0.02 0.01 0.08" rpy="0 0 0"/>
-    <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="0" velocity="1"/></joint>
-"#;
+/// A positioner before the arm.
+fn on_a_positioner() -> RobotDescription {
+    with(&positioner(0.75, 0.8))
+}
 
 const RAIL: &str = r#"
   <link name="hall"/>
@@ -63,7 +60,7 @@ fn cells() -> [Cell; 3] {
     let placed = RobotDescription::from_text(&two.path, placed).unwrap();
     let chain = |robot: &RobotDescription| robot.chain(Some(&ends.0), Some(ends.1)).unwrap();
     [
-        same("positioner", with(POSITIONER).chain(Some("table"), Some("link_6")).unwrap()),
+        same("positioner", on_a_positioner().chain(Some("table"), Some("link_6")).unwrap()),
         same("rail", with(RAIL).chain(None, Some("link_6")).unwrap()),
         Cell { name: "two arms", actual: chain(&placed), known: chain(&two) },
     ]
@@ -137,7 +134,7 @@ fn the_urdf_of_a_carried_base_has_every_origin_where_it_belongs() {
     let solution = identify(cell.known.clone(), &[measured(&world, &cell.known)], &Options::default()).unwrap();
     let robot = &solution.fit.state.robot;
     let origins: BTreeMap<String, Pose> = robot.urdf_origins().into_iter().map(|(n, o)| (n.to_owned(), o)).collect();
-    let text = patch_origins(&with(POSITIONER).text, &origins).unwrap();
+    let text = patch_origins(&on_a_positioner().text, &origins).unwrap();
     let written = RobotDescription::from_text(Path::new("written.urdf"), text).unwrap();
     let read = robotcal::model::robot::Robot {
         terms: robot.as_exported().terms,

@@ -17,6 +17,7 @@ use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::simulate::truth::Truth;
 use robotcal::simulate::{WorldRequest, series as simulated};
 use robotcal::study::measured;
+use robotcal::urdf::Chain;
 use robotcal::{Code, Error};
 use tempfile::TempDir;
 
@@ -455,22 +456,29 @@ fn posture_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(turned).fold(0.0, f64::max)
 }
 
+/// Stops in the posture of their readings, where that nearest to the stop before is taken, and as the calibration tells it.
+fn nearest_and_told(folder: &Path, chain: &Chain, readings: &[Vec<f64>]) -> ([usize; 2], Calibration) {
+    let right = |found: Vec<&[f64]>| {
+        found.into_iter().zip(readings).filter(|(found, read)| posture_difference(found, read) < 1e-3).count()
+    };
+    let nearest = robotcal::identify::readings_of(&robotcal::series::read(folder).unwrap(), chain).unwrap();
+    let nearest = right(nearest.iter().flatten().map(Vec::as_slice).collect());
+    let inputs = Inputs::read(&urdf(), &[folder.to_path_buf()], Ends::default()).unwrap();
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let calibration = Calibration::of(inputs.observe(&options.limits, &|_, _| ()).unwrap(), &options).unwrap();
+    let told = &calibration.solution().series[0].stops;
+    let told = right(told.iter().filter_map(|s| s.readings.as_deref()).collect());
+    ([nearest, told], calibration)
+}
+
 /// The stops of the dataset are in all postures, the nearest of which is right by chance.
 #[test]
 fn the_images_tell_in_which_posture_a_pose_was_reached() {
     let (robot, readings, poses) = by_joints();
     let chain = robot.chain;
     let folder = series("quaternion", "qx,qy,qz,qw", &poses, quaternion);
-    let right = |found: Vec<&[f64]>| {
-        found.into_iter().zip(&readings).filter(|(found, read)| posture_difference(found, read) < 1e-3).count()
-    };
-    let nearest = robotcal::identify::readings_of(&robotcal::series::read(folder.path()).unwrap(), &chain).unwrap();
-    let nearest = right(nearest.iter().flatten().map(Vec::as_slice).collect());
-    let inputs = Inputs::read(&urdf(), &[folder.path().to_path_buf()], Ends::default()).unwrap();
-    let options = Options { model: RobotModel::Rigid, ..Options::default() };
-    let calibration = Calibration::of(inputs.observe(&options.limits, &|_, _| ()).unwrap(), &options).unwrap();
+    let ([nearest, told], calibration) = nearest_and_told(folder.path(), &chain, &readings);
     let solution = calibration.solution();
-    let told = right(solution.series[0].stops.iter().filter_map(|s| s.readings.as_deref()).collect());
     println!("nearest {nearest}, told {told} of {}", readings.len());
     assert!(nearest < readings.len() / 2 && told + 1 >= readings.len(), "{nearest}, {told}");
     assert!(solution.findings.iter().any(|f| f.code() == Code::PosturesByImages));
@@ -518,18 +526,10 @@ const TRACKER_RAD: f64 = 1e-4;
 fn a_tracker_tells_in_which_posture_a_pose_was_reached() {
     let (robot, readings, poses) = by_joints();
     let chain = robot.chain;
-    let right = |found: Vec<&[f64]>| {
-        found.into_iter().zip(&readings).filter(|(found, read)| posture_difference(found, read) < 1e-3).count()
-    };
     for as_poses in [true, false] {
         let folder = tracked(&poses, &readings, as_poses);
-        let nearest = robotcal::identify::readings_of(&robotcal::series::read(folder.path()).unwrap(), &chain).unwrap();
-        let nearest = right(nearest.iter().flatten().map(Vec::as_slice).collect());
-        let inputs = Inputs::read(&urdf(), &[folder.path().to_path_buf()], Ends::default()).unwrap();
-        let options = Options { model: RobotModel::Rigid, ..Options::default() };
-        let calibration = Calibration::of(inputs.observe(&options.limits, &|_, _| ()).unwrap(), &options).unwrap();
+        let ([nearest, told], calibration) = nearest_and_told(folder.path(), &chain, &readings);
         let solution = calibration.solution();
-        let told = right(solution.series[0].stops.iter().filter_map(|s| s.readings.as_deref()).collect());
         let all = readings.len();
         println!("poses {as_poses}: nearest {nearest}, told {told} of {all}");
         assert!(nearest < all / 2 && told + 2 >= all, "{nearest}, {told}");

@@ -44,3 +44,16 @@ pub fn made_with() -> String {
     let commit = git(&["describe", "--always", "--dirty", "--exclude=*"]).map(|o| String::from_utf8(o.stdout).unwrap());
     format!("Made with robotcal {}, commit {}.\n", env!("CARGO_PKG_VERSION"), commit.unwrap_or_default().trim())
 }
+
+/// Links and joints of a positioner of two axes, so far before `base_link` (m) and tilted by so much at most (rad); its last link is `table`.
+pub fn positioner(before_m: f64, tilt_rad: f64) -> String {
+    format!(
+        r#"
+  <link name="trunnion"/><link name="table"/>
+  <joint name="tilt" type="revolute"><parent link="base_link"/><child link="trunnion"/><origin xyz="{before_m} 0 0.3" rpy="0 0 0.3"/>
+    <axis xyz="0 1 0"/><limit lower="-{tilt_rad}" upper="{tilt_rad}" effort="0" velocity="1"/></joint>
+  <joint name="turn" type="revolute"><parent link="trunnion"/><child link="table"/><origin xyz="0.02 0.01 0.08" rpy="0 0 0"/>
+    <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="0" velocity="1"/></joint>
+"#
+    )
+}
