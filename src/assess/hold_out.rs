@@ -12,7 +12,9 @@ use crate::init::resect_near;
 use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Image, Problem, State, TakenFrom, Weighting, posture_groups, predict};
-use crate::solve::{LinearProblem, LinearisedAdjustment, Outcome, Settings, side_by_side, solve};
+use crate::solve::{
+    ComponentOptions, LinearProblem, LinearisedAdjustment, Outcome, Settings, estimate_components, side_by_side, solve,
+};
 use crate::stage::stage;
 
 /// Errors of predicted images.
@@ -48,8 +50,12 @@ pub type Refit<'a> = dyn Fn(LinearisedAdjustment) -> Option<State> + Sync + 'a;
 
 const FOLDS: usize = 6;
 
-/// Joint error that a nominal robot is allowed per stop, rad or m, so that its geometric errors do not bend camera and plate.
+/// Joint error that a nominal robot is allowed per stop at first, rad or m, so that its geometric errors do not bend camera and plate. The images then
+/// say how large it is: of a robot that is nearly right, base and tool would else be no better known than by the pose of each image alone.
 const NOMINAL_JOINT_ERROR: f64 = 3e-3;
+
+/// Rounds in which the joint error of the nominal robot is estimated: it is a weight, and need not be known well.
+const NOMINAL_ROUNDS: usize = 8;
 
 /// Error of its pose that it is allowed in place of that where no image is, m and rad: base and tool are then where it misses least. By joint errors
 /// the few stops at which these cannot be what it misses by would decide.
@@ -86,7 +92,14 @@ const NOMINAL_STOPS: usize = 500;
 pub(super) fn nominal(fit: &Adjustment) -> Outcome {
     let nominal = of_nominal(fit);
     let settings = of_fold(&nominal);
-    solve(nominal, &settings)
+    if nominal.problem.used().next().is_none() {
+        return solve(nominal, &settings);
+    }
+    let rounds = NOMINAL_ROUNDS;
+    estimate_components(
+        nominal,
+        &ComponentOptions { factors: false, joint: true, displacement: false, rounds, settings },
+    )
 }
 
 fn of_nominal(fit: &Adjustment) -> Adjustment {
