@@ -292,7 +292,7 @@ limits! {
 
     /// Misfit of readings and images, rad + m, below which no mistake is looked for: nominal robots miss by as much.
     suspicious_misfit: f64 = 0.025;
-    /// Median misfit of distances, with directions that fit, from which the links are those of another robot, m.
+    /// Median misfit of distances, less what that of the directions displaces, from which the links are those of another robot, m.
     other_lengths_m: f64 = 0.025;
     /// Fewest stops at all of which a joint reads the same before that is named as the likely cause: of few stops some leave a joint alone.
     constant_stops: usize = 8;

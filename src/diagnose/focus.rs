@@ -56,13 +56,13 @@ fn of_camera(problem: &Problem, camera: usize, setting: &CheckContext) -> Option
     let all = of_camera.filter_map(|(i, _)| Some((i, setting.free.poses[i].as_ref()?.focal?)));
     let votes: Vec<(usize, FocalLength)> =
         all.filter(|(_, focal)| focal.information > limits.focus_information).collect();
-    let values: Vec<f64> = votes.iter().map(|(_, focal)| focal.change).collect();
     let of_split = |split: usize| {
-        let (before, after) = values.split_at(split);
-        let ((m1, s1), (m2, s2)) = (mean_and_error(before), mean_and_error(after));
-        (split, m2 - m1, (m2 - m1).abs() / s1.hypot(s2).max(1e-12))
+        let (before, after) = votes.split_at(split);
+        let (before, after) = (Votes::of(before), Votes::of(after));
+        let change = after.mean - before.mean;
+        (split, change, change.abs() / before.error_beside(&after).max(1e-12))
     };
-    let splits = limits.focus_images..(values.len() + 1).saturating_sub(limits.focus_images);
+    let splits = limits.focus_images..(votes.len() + 1).saturating_sub(limits.focus_images);
     let counts =
         |(_, change, sigmas): &(usize, f64, f64)| change.abs() > limits.focus_change && *sigmas > limits.focus_sigmas;
     // Of equals the first.
@@ -71,11 +71,31 @@ fn of_camera(problem: &Problem, camera: usize, setting: &CheckContext) -> Option
     Some(FocusChange::of(problem, camera, image, (change, sigmas), Weight::Gate))
 }
 
-fn mean_and_error(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
+/// What some images say of the focal length.
+struct Votes {
+    count: f64,
+    mean: f64,
+    /// Sum of the squares of the deviations from the mean.
+    squares: f64,
+    /// Mean variance that the images state themselves.
+    stated: f64,
+}
+
+impl Votes {
+    fn of(votes: &[(usize, FocalLength)]) -> Self {
+        let count = votes.len() as f64;
+        let mean_of = |value: &dyn Fn(&FocalLength) -> f64| votes.iter().map(|(_, v)| value(v)).sum::<f64>() / count;
+        let mean = mean_of(&|v| v.change);
+        let squares = count * mean_of(&|v| (v.change - mean).powi(2));
+        Self { count, mean, squares, stated: mean_of(&|v| 1.0 / v.information) }
+    }
+
+    /// Standard error of the difference of the means. A few images may agree by luck: none scatter less than all do, or than they state themselves.
+    fn error_beside(&self, other: &Self) -> f64 {
+        let pooled = (self.squares + other.squares) / (self.count + other.count - 2.0);
+        let of = |votes: &Self| (votes.squares / (votes.count - 1.0)).max(pooled).max(votes.stated) / votes.count;
+        (of(self) + of(other)).sqrt()
+    }
 }
 
 impl Kind for FocusChange {

@@ -119,7 +119,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
         let is_suspected = || released.one_step().is_some_and(|told| beyond(&told, limits.plate_size_suspected));
         let uneven = uneven(&fit.adjustment, k, limits);
         let fitted = if uneven.is_some() || is_suspected() { released.fitted(problem, setting) } else { None };
-        let fitted = fitted.filter(|fitted| fitted.told.sigma < limits.plate_size_told);
+        let fitted = fitted.filter(|fitted| fitted.told.relative_sigma() < limits.plate_size_told);
         let in_order = || fitted.as_ref().map(|fitted| fitted.in_order.clone()).unwrap_or_default();
         let measured = plate.scale.is_some();
         if let Some(Fitted { told, .. }) = &fitted
@@ -274,6 +274,13 @@ impl Kind for DoubtedSize {
 struct Told {
     off: f64,
     sigma: f64,
+}
+
+impl Told {
+    /// Standard deviation, relative to the size that is told: that of a size that tends to nothing tends to nothing, too.
+    fn relative_sigma(&self) -> f64 {
+        if self.off > -1.0 { self.sigma / (1.0 + self.off) } else { f64::INFINITY }
+    }
 }
 
 /// What a fit with a free size says.

@@ -229,12 +229,15 @@ impl Suspects<'_> {
     }
 }
 
-/// Median misfits of directions, rad, and of distances, m, where directions fit and distances do not.
+/// Median misfits of directions, rad, and of distances, m, where directions fit and distances do not: not even less what the directions displace of a
+/// plate that is as far away.
 pub(in crate::identify) fn directions_alone(pairs: &[PosePair], limits: &Limits) -> Option<(f64, f64)> {
     let start = solve_hand_eye(pairs).into_iter().next()?;
     let (angles, distances): (Vec<f64>, Vec<f64>) = pairs.iter().map(|p| start.solution.error(p)).unzip();
     let (angle_rad, distance_m) = (median(angles).unwrap_or(f64::INFINITY), median(distances).unwrap_or(f64::INFINITY));
-    (angle_rad < limits.suspicious_misfit && distance_m > limits.other_lengths_m).then_some((angle_rad, distance_m))
+    let far_m = median(pairs.iter().map(|p| p.camera_from_plate.translation.norm()))?;
+    let by_lengths_m = distance_m - angle_rad * far_m;
+    (angle_rad < limits.suspicious_misfit && by_lengths_m > limits.other_lengths_m).then_some((angle_rad, distance_m))
 }
 
 /// The scale of the plate that fits best.

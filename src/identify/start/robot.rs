@@ -289,7 +289,7 @@ fn check_fit(suspects: &Suspects, misfit: f64, of: &str, how: &str) -> Result<()
         let how = format!("{how} the camera poses miss by {:.0} (median, mm plus mrad)", 1e3 * misfit);
         return Err(suspects
             .constant_joints()
-            .map_or_else(|| no_fit(of, suspects.robot, &how), |joints| not_moved(&joints, suspects, &how)));
+            .map_or_else(|| no_fit_of(suspects, of, &how), |joints| not_moved(&joints, suspects, &how)));
     }
     Ok(())
 }
@@ -307,6 +307,18 @@ fn no_fit(of: &str, robot: &Robot, how: &str) -> Error {
     };
     let what = format!("{what} and images do not belong together: {how}");
     Error::new(Code::ReadingsContradict, of, what, remedy)
+}
+
+/// As [`no_fit`]; of fewer images than tell other zeros of the joints, these are named, too.
+fn no_fit_of(suspects: &Suspects, of: &str, how: &str) -> Error {
+    let error = no_fit(of, suspects.robot, how);
+    let fewest = suspects.limits.zeros_images;
+    if suspects.robot.chain.pose_coordinates().is_some() || suspects.pairs.len() >= fewest {
+        return error;
+    }
+    let zeros =
+        format!("; a joint may be mastered wrongly by degrees, which {fewest} images and more tell: take so many");
+    Error { remedy: error.remedy + &zeros, ..error }
 }
 
 /// Refuses readings that contradict, where some joints read the same at all stops.
