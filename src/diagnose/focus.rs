@@ -136,3 +136,25 @@ impl Kind for FocusChange {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn votes(changes: &[f64], information: f64) -> Vec<(usize, FocalLength)> {
+        changes.iter().map(|&change| (0, FocalLength { change, information })).collect()
+    }
+
+    #[test]
+    fn a_few_images_that_agree_by_luck_are_no_better_known_than_all() {
+        let scattered: Vec<f64> = (0..37).map(|k| 0.01 * f64::sin(7.0 * f64::from(k))).collect();
+        let all = Votes::of(&votes(&scattered, 1e6));
+        let few = Votes::of(&votes(&[-0.0251, -0.0250, -0.0249], 1e6));
+        let error = few.error_beside(&all);
+        let usual = (all.squares / 36.0).sqrt();
+        assert!((error / (usual * f64::sqrt(1.0 / 3.0 + 1.0 / 37.0)) - 1.0).abs() < 0.05, "{error} of {usual}");
+        // What they state themselves is no less than it is.
+        let [few, all] = [few, all].map(|v| Votes { stated: 1e-3, ..v });
+        assert!(few.error_beside(&all) > f64::sqrt(1e-3 / 3.0));
+    }
+}

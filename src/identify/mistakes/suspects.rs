@@ -254,3 +254,33 @@ pub(in crate::identify) fn left_by_scale(pairs: &[PosePair], scale: f64) -> Opti
     });
     Some(solve_hand_eye(&scaled.collect::<Vec<_>>()).first()?.median_error)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Images of a plate `far_m` away, each turned by some 10 mrad about the camera, in which the hand is displaced by some `length_m`.
+    fn pairs(far_m: f64, length_m: f64) -> Vec<PosePair> {
+        let (camera, plate) =
+            (Pose::from_xyz_rpy([0.02, 0.05, 0.1], [0.1, 0.2, 1.5]), Pose::from_xyz_rpy([1.0, 0.2, 0.0], [0.0; 3]));
+        let scattered = |k: usize, by: f64| [1.3, 2.9, 4.7].map(|f| by * f64::sin(f * k as f64 + f));
+        let pair = |k: usize| {
+            let seen = Pose::from_xyz_rpy([0.0, 0.0, far_m], scattered(k, 0.6));
+            let turned = Pose::from_xyz_rpy([0.0; 3], scattered(k + 50, 0.008));
+            let displaced = Pose::from_xyz_rpy(scattered(k + 90, length_m), [0.0; 3]);
+            PosePair { camera_from_plate: turned * seen, chain: displaced * camera * seen * plate.inverse() }
+        };
+        (0..30).map(pair).collect()
+    }
+
+    #[test]
+    fn links_are_not_blamed_for_what_directions_displace_far_away() {
+        let limits = Limits::default();
+        for (far_m, length_m, are_lengths) in
+            [(4.0, 0.002, false), (0.5, 0.002, false), (0.5, 0.06, true), (2.5, 0.12, true)]
+        {
+            let found = directions_alone(&pairs(far_m, length_m), &limits);
+            assert_eq!(found.is_some(), are_lengths, "{far_m} m, {length_m} m: {found:?}");
+        }
+    }
+}
