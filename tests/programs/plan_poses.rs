@@ -508,6 +508,45 @@ fn names_cannot_become_statements_of_the_planned_programs() {
     }
 }
 
+/// A positioner before the KR 6, as a file; its table is a base that joints carry.
+fn positioner_file(folder: &Path) -> PathBuf {
+    let text = std::fs::read_to_string(urdf("kuka_kr6_r900")).unwrap();
+    let end = text.rfind("</robot>").unwrap();
+    let path = folder.join("cell.urdf");
+    std::fs::write(&path, format!("{}{}{}", &text[..end], positioner(0.55, 0.5), &text[end..])).unwrap();
+    path
+}
+
+/// A solution has base and tip: further poses are planned between them, of the URDF in it as well as of one that is given.
+#[test]
+fn further_poses_of_a_cell_are_planned_between_the_links_of_the_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (cell, series, result) = (positioner_file(folder.path()), at("series"), at("result"));
+    let cell = cell.to_str().unwrap();
+    let ends = ["--urdf", cell, "--base", "table", "--tip", "link_6"];
+    let made = ["simulate", "--images", "30", "--observations", "--held-out", "0", "--out", &series];
+    let (code, _, error) = run(&[&made[..], &ends].concat());
+    assert_eq!(code, 0, "{error}");
+    let (code, _, error) =
+        run(&[&["identify", &series, "--robot-model", "rigid", "--out", &result][..], &ends].concat());
+    assert!(code <= 1, "{error}");
+    let from = format!("{result}/solution.json");
+    let plan = |name: &str, more: &[&str]| {
+        let base = ["plan", "--from", &from, "--count", "2", "--candidates", "20", "--rounds", "0", "--out"];
+        let (code, _, error) = run(&[&base[..], &[&at(name)], more].concat());
+        assert_eq!(code, 0, "{error}");
+        std::fs::read_to_string(folder.path().join(name).join("joints.csv")).unwrap()
+    };
+    let stated = plan("stated", &ends);
+    assert!(stated.lines().next().unwrap().ends_with("joint_a6") && stated.contains("turn,tilt"), "{stated}");
+    assert_eq!(plan("given", &["--urdf", cell]), stated);
+    assert_eq!(plan("own", &[]), stated);
+    // The URDF of the arm alone has no table.
+    let arm = urdf("kuka_kr6_r900");
+    assert_eq!(plan("arm", &["--urdf", arm.to_str().unwrap()]), stated);
+}
+
 /// The plate lies on a table that a positioner turns: what carries it is in nobody's way, and the floor stands still.
 #[test]
 fn poses_are_planned_of_a_plate_on_a_positioner() {

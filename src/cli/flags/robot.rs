@@ -15,10 +15,18 @@ pub fn read_chain(file: &Path, base: Option<&str>, tip: Option<&str>) -> Result<
 pub fn noted_chain(description: &RobotDescription, base: Option<&str>, tip: Option<&str>) -> Result<Chain> {
     let chain = description.chain(base, tip)?;
     let tip = description.tip_notice(base, tip);
-    tip.iter()
-        .chain(&Notice::said_once(&description.notices))
-        .for_each(|notice| say_line!("note      {}", notice.coded()));
+    tip.iter().for_each(say);
+    say_notices(description);
     Ok(chain)
+}
+
+fn say(notice: &Notice) {
+    say_line!("note      {}", notice.coded());
+}
+
+/// Says what was noticed of a description.
+pub fn say_notices(description: &RobotDescription) {
+    Notice::said_once(&description.notices).iter().for_each(say);
 }
 
 /// Refuses a description in degrees, by which a robot is to be moved.

@@ -14,7 +14,7 @@ use crate::cli::Verdict;
 use crate::cli::flags::arguments::{command_of_report, pair};
 use crate::cli::flags::choices::Model;
 use crate::cli::flags::pose_argument::pose_or_file;
-use crate::cli::flags::robot::{noted_chain, read_chain, refuse_degrees};
+use crate::cli::flags::robot::{noted_chain, read_chain, refuse_degrees, say_notices};
 use crate::cli::results::show::read_solution;
 use crate::cli::terminal::say::{say, say_line};
 use crate::error::{Code, Error, Result};
@@ -22,7 +22,8 @@ use crate::geom::{OrientedBox, Pose};
 use crate::identify::RobotModel;
 use crate::model::camera::Camera;
 use crate::output::camera_formats::read_camera_file;
-use crate::output::restore::entered_offsets;
+use crate::output::restore::{self, entered_offsets};
+use crate::output::solution_json::SolutionRecord;
 use crate::output::{ResultFolder, plan_files, plan_html, plan_programs, plan_start, sigma_text};
 use crate::plan::candidates::CandidateOptions;
 use crate::plan::refine::USUAL_ROUNDS;
@@ -37,13 +38,13 @@ use crate::plan::{
 use crate::series::{CameraMount, read_plate};
 use crate::simulate::typical_camera;
 use crate::study::{PlanStudyRequest, plan_study};
-use crate::urdf::{self, Chain, JointKind};
+use crate::urdf::{self, Chain, JointKind, RobotDescription};
 
 /// Flags of `plan`.
 #[derive(Debug, Args)]
 pub struct PlanArgs {
-    /// Robot description (URDF)
-    #[arg(long, value_name = "FILE", required_unless_present = "touch")]
+    /// Robot description (URDF) [default with --from: that of the result]
+    #[arg(long, value_name = "FILE", required_unless_present = "from")]
     urdf: Option<PathBuf>,
     /// New folder for joints.csv, programs and plan.html, or one of an earlier plan that nobody has worked with
     #[arg(long, value_name = "FOLDER")]
@@ -63,10 +64,10 @@ pub struct PlanArgs {
     #[arg(long, value_name = "solution.json", conflicts_with_all = [
         "plate", "camera", "camera_fov_deg", "image", "mount", "hand_camera", "pixel_noise_px", "joint_noise_mrad"])]
     from: Option<PathBuf>,
-    /// Base link
+    /// Base link [default with --from: that of the result]
     #[arg(long, value_name = "LINK", help_heading = "Robot")]
     base: Option<String>,
-    /// Tip link
+    /// Tip link [default with --from: that of the result]
     #[arg(long, value_name = "LINK", help_heading = "Robot")]
     tip: Option<String>,
     /// Camera (ROS camera_info, or a file of OpenCV, Kalibr or mrcal)
@@ -159,14 +160,14 @@ pub struct PlanArgs {
     #[arg(long, default_value_t = 1, help_heading = "Search")]
     seed: u64,
     /// Study instead of a plan: 30 planned against 60 random poses in as many simulated worlds; writes study.md
-    #[arg(long, value_name = "WORLDS", help_heading = "Search")]
+    #[arg(long, value_name = "WORLDS", conflicts_with = "from", help_heading = "Search")]
     study: Option<u64>,
     #[command(flatten)]
     touches: TouchArgs,
 }
 
 impl PlanArgs {
-    /// The URDF, which is required unless touches are planned.
+    /// The URDF, which is required unless it is in the result from which further images or touches are planned.
     fn urdf(&self) -> &Path {
         self.urdf.as_deref().unwrap_or(Path::new(""))
     }
@@ -195,12 +196,11 @@ pub fn run(args: &PlanArgs) -> Result<Verdict> {
         return study(args, worlds);
     }
     let place = ResultFolder::claim(&args.out, plan_files::FILE_NAME)?;
-    let description = urdf::read(args.urdf())?;
-    refuse_degrees(&description)?;
-    let chain = noted_chain(&description, args.base.as_deref(), args.tip.as_deref())?;
+    let record = args.from.as_deref().map(read_solution).transpose()?;
+    let (description, chain) = robot(args, record.as_ref())?;
     let (capsules, meshes) = description.carried_capsules(&chain);
     let described = scene::described(&capsules, &chain);
-    let mut request = request(args, chain)?;
+    let mut request = request(args, record.as_ref(), chain)?;
     request.scene.described = described;
     let mut words = settle_place(args, &mut request)?;
     words.extend(noise_word(&request));
@@ -224,6 +224,29 @@ pub fn run(args: &PlanArgs) -> Result<Verdict> {
     place.write_all(&files)?;
     say!("{}", summary(&request, &plan, &forecast, &files, &args.out));
     Ok(Verdict::Good)
+}
+
+/// The robot description and the chain of it that is planned for: what is not given of them is that of the result.
+fn robot(args: &PlanArgs, record: Option<&SolutionRecord>) -> Result<(RobotDescription, Chain)> {
+    let given = args.urdf.as_deref().map(urdf::read).transpose()?;
+    given.as_ref().map_or(Ok(()), refuse_degrees)?;
+    let [base, tip] = [&args.base, &args.tip].map(Option::as_deref);
+    match (record, given) {
+        (Some(record), given) => {
+            let ends = [base.unwrap_or(&record.robot.base), tip.unwrap_or(&record.robot.tip)];
+            // Of a cell of two arms the URDF given may be that of one of them.
+            let whole = given.filter(|urdf| ends.iter().all(|end| urdf.links().any(|link| link == *end)));
+            let description = whole.map_or_else(|| restore::robot_description(record), Ok)?;
+            let chain = restore::chain(record, &description, ends[0], ends[1])?;
+            say_notices(&description);
+            Ok((description, chain))
+        }
+        (None, Some(given)) => {
+            let chain = noted_chain(&given, base, tip)?;
+            Ok((given, chain))
+        }
+        (None, None) => Err(Error::new(Code::OptionMissing, "--urdf", "is missing", "give the URDF of the robot")),
+    }
 }
 
 /// Says from which noise further images are planned: that of the result.
@@ -343,9 +366,9 @@ fn check(args: &PlanArgs) -> Result<()> {
     Ok(())
 }
 
-fn request(args: &PlanArgs, chain: Chain) -> Result<PlanRequest> {
+fn request(args: &PlanArgs, record: Option<&SolutionRecord>, chain: Chain) -> Result<PlanRequest> {
     let demand = demand(args, &chain)?;
-    let (setting, taken) = setting(args, chain)?;
+    let (setting, taken) = setting(args, record, chain)?;
     let boxes = args.r#box.iter().map(|text| {
         let v = numbers("--box", text, 6, "give middle and edges: x,y,z,a,b,c in m")?;
         let half_m = Vector3::new(v[3], v[4], v[5]) / 2.0;
@@ -402,17 +425,16 @@ fn demand(args: &PlanArgs, chain: &Chain) -> Result<Demand> {
     })
 }
 
-fn setting(args: &PlanArgs, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)> {
+fn setting(args: &PlanArgs, record: Option<&SolutionRecord>, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)> {
     let asked: Option<RobotModel> = args.robot_model.map(Into::into);
-    if let Some(path) = &args.from {
-        let record = read_solution(path)?;
-        if entered_offsets(&record)?.iter().any(|offset| *offset != 0.0) {
+    if let Some(record) = record {
+        if entered_offsets(record)?.iter().any(|offset| *offset != 0.0) {
             say_line!(
                 "readings  the joint values are those of the controller before the offsets of mastering.csv were entered, as those of the images before"
             );
         }
-        let model = asked.unwrap_or_else(|| plan_start::model_of(&record, &chain));
-        let (mut setting, taken) = plan_start::from_solution(&record, chain, model)?;
+        let model = asked.unwrap_or_else(|| plan_start::model_of(record, &chain));
+        let (mut setting, taken) = plan_start::from_solution(record, chain, model)?;
         let others = record.images.iter().filter(|i| i.is_used_on_robot()).count() - taken.len();
         if others > 0 {
             say_line!(

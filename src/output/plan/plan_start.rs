@@ -56,7 +56,7 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
     let refuse = |what: String, remedy: &str| Error::new(Code::SolutionDiffers, "solution.json", what, remedy);
     if record.robot.readings != chain.readings {
         let what = format!("is of joints {}", record.robot.readings.join(", "));
-        return Err(refuse(what, "give the URDF, --base and --tip with which it was made"));
+        return Err(refuse(what, "leave out --urdf, --base and --tip, or give those with which it was made"));
     }
     let first = record.images.iter().find(|i| i.is_used_on_robot()).ok_or_else(|| {
         refuse("has no image on the robot in use".into(), "plan from --plate-pose and --hand-camera instead")
