@@ -92,6 +92,15 @@ impl Robot {
         self.chain.joints.iter().enumerate().map(behind).collect()
     }
 
+    /// Where the link stands that carries the first moving joint of the arm, `base_from_foot`, where joints carry the base, at these readings; `None`
+    /// where the base stands still ([`Chain::base_from_foot`]).
+    pub fn moving_base_from_foot(&self, readings: &[f64]) -> Option<Pose> {
+        let climbed = self.chain.climbed();
+        let fixed = self.chain.joints[climbed..].iter().take_while(|j| j.kind == JointKind::Fixed).count();
+        let before = (climbed + fixed).checked_sub(1).filter(|_| self.chain.base_moves())?;
+        self.link_poses(readings).get(before).copied()
+    }
+
     /// What the kinematics of all stops share.
     pub fn linear_origins(&self) -> LinearOrigins {
         let moved =

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use nalgebra::Vector3;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -276,24 +277,23 @@ fn out_of_reach(setting: &Setting, options: &CandidateOptions, workable: usize) 
         return Error::new(Code::PlanOutOfReach, "plan: robot", what, remedy);
     }
     let arm = chain.arm_length_m();
-    let foot = chain.base_from_foot();
-    let stands = if foot.is_none() { "base" } else { "foot of the robot" };
-    let foot = foot.unwrap_or_else(Pose::identity).translation;
+    let Foot { position, name: stands, place } = Foot::of(setting);
     let well = 0.55 * arm;
+    let far = |pose: &Pose| (pose.translation - position).norm();
     let (thing, distance, remedy) = match setting.mount {
         CameraMount::Hand => (
             "plate",
-            setting.placements.iter().map(|p| (p.1.translation - foot).norm()).fold(0.0, f64::max),
+            setting.placements.iter().map(|p| far(&p.1)).fold(0.0, f64::max),
             format!(
-                "put the plate (--plate-pose) nearer, about {well:.2} m from the {stands} with its face up and towards the robot, \
+                "put the plate (--plate-pose) nearer, about {well:.2} m from the {stands}{place} with its face up and towards the robot, \
                  or check --hand-camera"
             ),
         ),
         CameraMount::Fixed => (
             "camera",
-            (setting.mounting.translation - foot).norm(),
+            far(&setting.mounting),
             format!(
-                "put the camera (--hand-camera) where its view, {:.2} to {:.2} m long, ends about {well:.2} m from the {stands} (its z \
+                "put the camera (--hand-camera) where its view, {:.2} to {:.2} m long, ends about {well:.2} m from the {stands}{place} (its z \
                  looks along the view), allow other distances (--distance-m), or check --plate-pose on the flange",
                 options.views.near_m, options.views.far_m
             ),
@@ -303,6 +303,35 @@ fn out_of_reach(setting: &Setting, options: &CandidateOptions, workable: usize) 
         "none of {workable} workable views is in reach: the {thing} stands {distance:.2} m from the {stands}, the arm is {arm:.2} m long"
     );
     Error::new(Code::PlanOutOfReach, format!("plan: {thing}"), what, remedy)
+}
+
+/// Where the arm stands, for messages.
+struct Foot {
+    /// In the base frame, m.
+    position: Vector3<f64>,
+    name: &'static str,
+    /// Where it is in the frame of a base that joints carry; empty of one that stands still.
+    place: String,
+}
+
+impl Foot {
+    /// The foot of the arm; where joints carry the base, with these in the middle of their ranges.
+    fn of(setting: &Setting) -> Self {
+        let chain = &setting.robot.chain;
+        let middle: Vec<f64> = reading_limits(chain).iter().map(|(low, high)| 0.5 * (low + high)).collect();
+        if let Some(foot) = setting.robot.moving_base_from_foot(&middle) {
+            let position = foot.translation;
+            let place = format!(
+                " (which is at {:.2}, {:.2}, {:.2} m in the frame of \"{}\", in which poses are given, with the joints that carry it in the \
+                 middle of their ranges)",
+                position.x, position.y, position.z, chain.base
+            );
+            return Self { position, name: "foot of the arm", place };
+        }
+        let foot = chain.base_from_foot();
+        let name = if foot.is_some() { "foot of the robot" } else { "base" };
+        Self { position: foot.map_or_else(Vector3::zeros, |foot| foot.translation), name, place: String::new() }
+    }
 }
 
 /// Every posture that reaches a workable view touches something.

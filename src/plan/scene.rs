@@ -160,17 +160,11 @@ fn floor_m(chain: &Chain) -> f64 {
     chain.base_from_foot().map_or(0.0, stands)
 }
 
-/// Length of the arm, m: behind the link on which both stand, where the base is carried.
-fn arm_m(chain: &Chain) -> f64 {
-    let joints = chain.joints[chain.climbed()..].to_vec();
-    Chain { joints, ..chain.clone() }.arm_length_m()
-}
-
 impl Scene {
     /// The scene of a setting.
     pub fn new(setting: &Setting, options: &SceneOptions) -> Self {
         let robot = &setting.robot;
-        let radius = options.link_radius_m.unwrap_or_else(|| RADIUS_SHARE * arm_m(&robot.chain));
+        let radius = options.link_radius_m.unwrap_or_else(|| RADIUS_SHARE * robot.chain.arm_length_m());
         let mut capsules = options.described.clone();
         capsules.extend(along_links(robot, radius, &options.described));
         capsules.sort_by_key(|c| c.order);

@@ -142,9 +142,10 @@ impl Chain {
         self.joints.iter().take_while(|j| j.upwards).count()
     }
 
-    /// Length of the arm: the sum of all origins behind the first moving joint, m.
+    /// Length of the arm: the sum of all origins behind the first moving joint, m; where joints carry the base, behind the link that carries them
+    /// and the arm.
     pub fn arm_length_m(&self) -> f64 {
-        let joints = self.joints.iter().skip_while(|j| j.kind == JointKind::Fixed).skip(1);
+        let joints = self.joints.iter().skip(self.climbed()).skip_while(|j| j.kind == JointKind::Fixed).skip(1);
         joints.map(|j| j.origin.translation.norm()).sum()
     }
 

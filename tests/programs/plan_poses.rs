@@ -547,6 +547,39 @@ fn further_poses_of_a_cell_are_planned_between_the_links_of_the_result() {
     assert_eq!(plan("arm", &["--urdf", arm.to_str().unwrap()]), stated);
 }
 
+/// Where joints carry the base, distances are those from the foot of the arm, which stands 0.55 m behind and 0.38 m below the table.
+#[test]
+fn what_is_out_of_reach_of_a_carried_base_is_measured_from_the_foot_of_the_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plate, cell) = (plate_file(folder.path()), positioner_file(folder.path()));
+    let out = folder.path().join("plan");
+    let base = [
+        "plan",
+        "--urdf",
+        cell.to_str().unwrap(),
+        "--base",
+        "table",
+        "--tip",
+        "tool0",
+        "--plate",
+        plate.to_str().unwrap(),
+    ];
+    let base = [&base[..], &["--candidates", "60", "--count", "4", "--out", out.to_str().unwrap()]].concat();
+    // The foot in the table: the way back up the positioner, at zero of both joints.
+    let foot = Pose::from_xyz_rpy([0.55, 0.0, 0.3], [0.0, 0.0, 0.3]) * Pose::from_xyz_rpy([0.02, 0.01, 0.08], [0.0; 3]);
+    let foot = foot.inverse().translation;
+    let away = [foot.x, foot.y + 4.0, foot.z].map(|v| format!("{v:.5}"));
+    let place = [format!("{:.2}, {:.2}, {:.2} m", foot.x, foot.y, foot.z), "4.00 m".into(), "\"table\"".into()];
+    let pose = format!("{},0,0,0", away.join(","));
+    let cases: [(&[&str], &str); 2] =
+        [(&["--plate-pose", &pose], "--plate-pose"), (&["--mount", "fixed", "--hand-camera", &pose], "--hand-camera")];
+    for (more, flag) in cases {
+        let (code, _, error) = run(&[&base[..], more].concat());
+        assert_eq!(code, 3, "{error}");
+        assert_says(&error, Code::PlanOutOfReach, &[&place[0], &place[1], &place[2], flag]);
+    }
+}
+
 /// The plate lies on a table that a positioner turns: what carries it is in nobody's way, and the floor stands still.
 #[test]
 fn poses_are_planned_of_a_plate_on_a_positioner() {
