@@ -8,9 +8,9 @@ use super::setting::{PlannedStop, Setting};
 use crate::geom::skew;
 use crate::linalg::{product, symmetric_eigen};
 use crate::model::robot::{Posture, Robot};
-use crate::problem::{self, Adjustment, Problem, SeenAtStop, TakenFrom, Weighting, by_columns, linearise};
+use crate::problem::{self, Adjustment, Image, Problem, SeenAtStop, TakenFrom, Weighting, by_columns, linearise};
 
-/// Information of the image of a stop about all columns; `None` where it shows nothing.
+/// Information of the images of a stop about all columns; `None` where they show nothing.
 ///
 /// Joint noise is eliminated (Schur complement); the corrections of single markers and the displacement field of a lens are taken as
 /// known.
@@ -25,18 +25,36 @@ fn carried(h: &DMatrix<f64>, t: &DMatrix<f64>) -> DMatrix<f64> {
     (&m + m.transpose()) * 0.5
 }
 
-/// Information `H` of an image about its camera pose and intrinsics, and their derivatives `T` by all columns.
+/// Information `H` of the images of a stop about their camera poses and intrinsics, and the derivatives `T` of these by all columns.
 fn condensed(
     Adjustment { problem, state }: &Adjustment,
-    PlannedStop { posture, image }: &PlannedStop,
+    PlannedStop { posture, images }: &PlannedStop,
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-    let prior: Vec<f64> = problem.noise.joint[image.series].iter().map(|s| s.powi(-2)).collect();
+    let prior: Vec<f64> = problem.noise.joint[images.first()?.series].iter().map(|s| s.powi(-2)).collect();
     let exact = vec![0.0; prior.len()];
-    let chain = state.chained(&problem.layout, image, TakenFrom::rigid(posture, &exact))?;
-    let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
-    let t = by_columns(&problem.layout, image, &chain);
-    let h = problem::condensed(&[SeenAtStop::of_image(&terms, chain.d_latent)], &prior)?;
-    Some((h, t))
+    let one = |image: &Image| {
+        let chain = state.chained(&problem.layout, image, TakenFrom::rigid(posture, &exact))?;
+        let terms = linearise(image, state, &chain.pose, &Weighting::of(problem, image))?;
+        let t = by_columns(&problem.layout, image, &chain);
+        Some((SeenAtStop::of_image(&terms, chain.d_latent), t))
+    };
+    let (seen, by_columns): (Vec<SeenAtStop>, Vec<DMatrix<f64>>) = images.iter().filter_map(one).unzip();
+    let h = problem::condensed(&seen, &prior)?;
+    Some((h, stacked(by_columns)?))
+}
+
+/// Rows of one matrix under those of the other; `None` without any.
+fn stacked(mut parts: Vec<DMatrix<f64>>) -> Option<DMatrix<f64>> {
+    if parts.len() == 1 {
+        return parts.pop();
+    }
+    let mut all = DMatrix::zeros(parts.iter().map(DMatrix::nrows).sum(), parts.first()?.ncols());
+    let mut row = 0;
+    for part in &parts {
+        all.rows_mut(row, part.nrows()).copy_from(part);
+        row += part.nrows();
+    }
+    Some(all)
 }
 
 fn condensed_candidate(

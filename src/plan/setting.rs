@@ -34,15 +34,33 @@ pub struct Setting {
     pub pixel_sigma_px: f64,
     /// Joint noise of every reading, rad or m.
     pub joint_sigma: Vec<f64>,
+    /// What images that were taken have beside.
+    pub beside: Beside,
 }
 
-/// A stop with the one image that is taken at it.
+/// Cameras, mountings and placements of images that were taken, beside those that are planned for: they have columns of their own, behind them.
+#[derive(Debug, Clone, Default)]
+pub struct Beside {
+    /// Cameras by name.
+    pub cameras: Vec<(String, Camera)>,
+    /// Mountings by name, as [`Setting::mounting`].
+    pub mountings: Vec<(String, Pose)>,
+    /// Placements by name, as [`Setting::placements`].
+    pub placements: Vec<(String, Pose)>,
+}
+
+/// A stop with the images that are taken at it: one, or several of as many cameras, which have its joint noise in common.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedStop {
     /// Joint readings.
     pub posture: Posture,
-    /// The image.
-    pub image: Image,
+    /// The images, one or more.
+    pub images: Vec<Image>,
+}
+
+/// Images that were taken at stops.
+pub fn images_of(stops: &[PlannedStop]) -> usize {
+    stops.iter().map(|stop| stop.images.len()).sum()
 }
 
 /// The least joint noise that is planned with, rad or m.
@@ -51,15 +69,20 @@ const LEAST_JOINT_SIGMA: f64 = 1e-6;
 impl Setting {
     /// A problem with the columns of this setting and no image, at the state about which it is linearised.
     pub fn adjustment(&self) -> Adjustment {
-        let names: Vec<String> = self.placements.iter().map(|p| p.0.clone()).collect();
-        let one = |name: &str| vec![name.to_owned()];
+        let Beside { cameras, mountings, placements } = &self.beside;
+        let own = [("hand_camera".to_owned(), self.mounting)];
+        let (mounting_names, mountings): (Vec<_>, Vec<_>) = own.into_iter().chain(mountings.iter().cloned()).unzip();
+        let placed = self.placements.iter().chain(placements).cloned();
+        let (placement_names, placements): (Vec<_>, Vec<_>) = placed.unzip();
+        let own = [("camera".to_owned(), self.camera.clone())];
+        let (camera_names, cameras): (Vec<_>, Vec<_>) = own.into_iter().chain(cameras.iter().cloned()).unzip();
         let state = State {
             robot: self.robot.clone(),
-            mountings: vec![self.mounting],
-            placements: self.placements.iter().map(|p| p.1).collect(),
+            mountings,
+            placements,
             instruments: Vec::new(),
             bodies: Vec::new(),
-            cameras: vec![self.camera.clone()],
+            cameras,
             plates: vec![PlateShape::nominal(&self.plate)],
             joint_errors: Vec::new(),
             ties: Vec::new(),
@@ -67,10 +90,10 @@ impl Setting {
         let mut layout = Layout::new(
             &state,
             &Names {
-                mountings: &one("hand_camera"),
-                placements: &names,
-                cameras: &one("camera"),
-                plates: &one("plate"),
+                mountings: &mounting_names,
+                placements: &placement_names,
+                cameras: &camera_names,
+                plates: &["plate".to_owned()],
                 ..Names::default()
             },
         );
@@ -81,16 +104,16 @@ impl Setting {
         let problem = Problem {
             layout,
             plates: vec![self.plate.clone()],
-            placements: names,
-            mountings: one("hand_camera"),
-            cameras: one("camera"),
+            noise: Noise { pixel_factor: vec![1.0; camera_names.len()], joint: vec![joint], ..Noise::default() },
+            placements: placement_names,
+            mountings: mounting_names,
+            cameras: camera_names,
             stops: Vec::new(),
             images: Vec::new(),
             instruments: Vec::new(),
             bodies: Vec::new(),
             body_measurements: Vec::new(),
             lengths: Vec::new(),
-            noise: Noise { pixel_factor: vec![1.0], joint: vec![joint], ..Noise::default() },
             families: Vec::new(),
             restraint: None,
             // Predictions have no residuals, so that it never acts.
@@ -103,13 +126,27 @@ impl Setting {
     /// An adjustment of this setting with the images of some stops, nothing known yet of their joint errors.
     pub fn with_stops(&self, planned: &Adjustment, stops: Vec<PlannedStop>) -> Adjustment {
         let mut with = planned.clone();
-        for (k, PlannedStop { posture, image }) in stops.into_iter().enumerate() {
-            with.problem.images.push(Image { stop: k, ..image });
+        for (k, PlannedStop { posture, images }) in stops.into_iter().enumerate() {
+            with.problem.images.extend(images.into_iter().map(|image| Image { stop: k, ..image }));
             with.problem.stops.push(Stop { series: 0, posture: Some(posture), local_share: Vec::new() });
         }
         with.state.joint_errors = vec![vec![0.0; self.joint_sigma.len()]; with.problem.stops.len()];
         with.state.ties = vec![Tie::Rigid; with.problem.images.len()];
         with
+    }
+
+    /// Adds placements that are planned for, and the stops that were taken with those beside behind them.
+    #[must_use]
+    pub fn with_further_placements(
+        &mut self,
+        new: Vec<(String, Pose)>,
+        mut taken: Vec<PlannedStop>,
+    ) -> Vec<PlannedStop> {
+        let (own, added) = (self.placements.len(), new.len());
+        self.placements.extend(new);
+        let beside = taken.iter_mut().flat_map(|stop| &mut stop.images).filter(|image| image.placement >= own);
+        beside.for_each(|image| image.placement += added);
+        taken
     }
 
     /// `camera_from_plate` at joint readings.
@@ -182,7 +219,7 @@ impl Setting {
             }
         }
         let posture = Posture::at(readings);
-        (!image.observations.is_empty()).then_some(PlannedStop { posture, image })
+        (!image.observations.is_empty()).then_some(PlannedStop { posture, images: vec![image] })
     }
 }
 

@@ -17,7 +17,7 @@ use crate::model::joint_terms::TermSizes;
 use crate::plan::candidates::{CandidateOptions, candidates, workspace};
 use crate::plan::information::flange_weight;
 use crate::plan::scene::{Scene, SceneOptions};
-use crate::plan::setting::{Setting, scale_sigma};
+use crate::plan::setting::{Beside, Setting, scale_sigma};
 use crate::plan::visibility::VisibilityLimits;
 use crate::plan::{Budget, Demand, PlanRequest, choose, exact_covariance, flange_m};
 use crate::problem::Adjustment;
@@ -182,6 +182,7 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
         plate: believed.clone(),
         pixel_sigma_px: PIXEL_SIGMA_PX,
         joint_sigma: joint_sigma(&request.chain),
+        beside: Beside::default(),
     };
     let chosen = PlanRequest {
         setting,

@@ -12,7 +12,7 @@ use robotcal::model::camera::{Camera, Lens};
 use robotcal::plan::candidates::CandidateOptions;
 use robotcal::plan::criterion::Criterion;
 use robotcal::plan::scene::{Capsule, Scene, SceneOptions};
-use robotcal::plan::setting::Setting;
+use robotcal::plan::setting::{Beside, Setting};
 use robotcal::plan::{Budget, Choice, Demand, Plan, PlanRequest, choose, forecast, plan};
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::urdf::{Chain, JointKind};
@@ -42,6 +42,7 @@ fn request(name: &str, count: usize) -> PlanRequest {
             plate: Plate::lattice(PlateKind::Points, 10, 7, 0.03, 1e-5),
             pixel_sigma_px: 0.05,
             joint_sigma: vec![3e-5; joints],
+            beside: Beside::default(),
             robot,
         },
         taken: Vec::new(),

@@ -28,7 +28,7 @@ use crate::output::{ResultFolder, plan_files, plan_html, plan_programs, plan_sta
 use crate::plan::candidates::CandidateOptions;
 use crate::plan::refine::USUAL_ROUNDS;
 use crate::plan::scene::{self, SceneOptions};
-use crate::plan::setting::{PlannedStop, Setting};
+use crate::plan::setting::{Beside, PlannedStop, Setting, images_of};
 use crate::plan::viewpoint::ViewRange;
 use crate::plan::visibility::VisibilityLimits;
 use crate::plan::{
@@ -256,7 +256,7 @@ fn noise_word(request: &PlanRequest) -> Option<String> {
     (!request.taken.is_empty()).then(|| {
         format!(
             "planned on top of {} images, with the noise found in them: joints {:.4} to {:.4} mrad (or mm), images {:.4} px",
-            request.taken.len(),
+            images_of(&request.taken),
             1e3 * range.0,
             1e3 * range.1,
             setting.pixel_sigma_px
@@ -435,15 +435,15 @@ fn setting(args: &PlanArgs, record: Option<&SolutionRecord>, chain: Chain) -> Re
         }
         let model = asked.unwrap_or_else(|| plan_start::model_of(record, &chain));
         let (mut setting, taken) = plan_start::from_solution(record, chain, model)?;
-        let others = record.images.iter().filter(|i| i.is_used_on_robot()).count() - taken.len();
+        let others = record.images.iter().filter(|i| i.is_used_on_robot()).count() - images_of(&taken);
         if others > 0 {
             say_line!(
-                "images    {others} of other cameras, mountings or plates than the first image are not counted: the accuracy before and after is that without them"
+                "images    {others} of other plates than that of the first image are not counted: the accuracy before and after is that without them"
             );
         }
-        for (k, text) in args.plate_pose.iter().enumerate() {
-            setting.placements.push((format!("new_{k}"), pose_or_file("--plate-pose", text)?));
-        }
+        let new = args.plate_pose.iter().enumerate();
+        let new = new.map(|(k, text)| Ok((format!("new_{k}"), pose_or_file("--plate-pose", text)?)));
+        let taken = setting.with_further_placements(new.collect::<Result<_>>()?, taken);
         return Ok((setting, taken));
     }
     let plate = args
@@ -489,6 +489,7 @@ fn setting(args: &PlanArgs, record: Option<&SolutionRecord>, chain: Chain) -> Re
         plate,
         pixel_sigma_px: args.pixel_noise_px,
         robot,
+        beside: Beside::default(),
     };
     Ok((setting, Vec::new()))
 }

@@ -1,6 +1,6 @@
 //! What a plan starts from: camera.yaml, pose files, solution.json.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use nalgebra::{Matrix2, Vector2, Vector6};
@@ -10,11 +10,11 @@ use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind};
 use crate::geom::Pose;
 use crate::identify::RobotModel;
-use crate::model::camera::Camera;
 use crate::model::joint_terms::JointTerm;
 use crate::model::robot::{Posture, Robot};
-use crate::output::solution_json::{ImageRecord, ObservationColumns, SolutionRecord};
-use crate::plan::setting::{PlannedStop, Setting};
+use crate::output::restore;
+use crate::output::solution_json::{ImageRecord, ObservationColumns, PlacedRecord, SolutionRecord};
+use crate::plan::setting::{Beside, PlannedStop, Setting};
 use crate::problem::{Image, Mark, MarkerObservation};
 use crate::series::{Marker, Plate};
 use crate::urdf::Chain;
@@ -47,8 +47,8 @@ pub fn read_pose(path: &Path) -> Result<Pose> {
 
 /// Setting and images of a solution: the robot as calibrated, its camera, mounting and placements, the images in use.
 ///
-/// Of several cameras, mountings and plates the first image on the robot decides, and so it does of the placements: those at which its plate was
-/// seen by cameras that are mounted as its own. `chain` is that of the URDF given.
+/// Of several cameras, mountings and plates the first image on the robot decides for which is planned, and so it does of the placements: those at
+/// which its plate was seen by cameras that are mounted as its own. Of the images in use all count that show its plate. `chain` is that of the URDF given.
 ///
 /// # Errors
 /// A solution of another robot, or without images on the robot.
@@ -61,37 +61,72 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
     let first = record.images.iter().find(|i| i.is_used_on_robot()).ok_or_else(|| {
         refuse("has no image on the robot in use".into(), "plan from --plate-pose and --hand-camera instead")
     })?;
-    let camera = &record.cameras[first.camera];
-    let mut lens = Camera::pinhole(camera.lens, camera.width_px, camera.height_px, 1.0);
-    for (slot, (_, value)) in lens.parameters.iter_mut().zip(&camera.parameters) {
-        *slot = *value;
-    }
-    let lens = lens.without_field();
-    let used = |i: &&ImageRecord| {
-        i.is_used_on_robot() && (i.camera, i.mounting, i.plate) == (first.camera, first.mounting, first.plate)
-    };
+    let used: Vec<&ImageRecord> =
+        record.images.iter().filter(|i| i.is_used_on_robot() && i.plate == first.plate).collect();
     let shows = |i: &ImageRecord| i.is_on_robot() && (i.camera_mount, i.plate) == (first.camera_mount, first.plate);
-    let placements: Vec<usize> =
+    let planned: Vec<usize> =
         (0..record.placements.len()).filter(|&k| record.images.iter().any(|i| shows(i) && i.placement == k)).collect();
-    let stop = |i: &ImageRecord| {
-        let placement = placements.iter().position(|k| *k == i.placement)?;
-        taken(i, placement, camera.pixel_factor, record)
+    let columns = Columns {
+        cameras: first_and_others(&[first.camera], used.iter().map(|i| i.camera)),
+        mountings: first_and_others(&[first.mounting], used.iter().map(|i| i.mounting)),
+        placements: first_and_others(&planned, used.iter().map(|i| i.placement)),
     };
-    let stops: Vec<PlannedStop> = record.images.iter().filter(used).filter_map(stop).collect();
+    let stops = stops(&used, &columns, record);
+    let placed = |all: &[PlacedRecord], which: &[usize]| {
+        which.iter().map(|&k| (all[k].name.clone(), (&all[k].pose).into())).collect::<Vec<_>>()
+    };
+    let camera = |k: &usize| (record.cameras[*k].name.clone(), restore::camera(&record.cameras[*k]).without_field());
     let setting = Setting {
         robot: calibrated(record, chain, model),
-        camera: lens,
+        camera: camera(&first.camera).1,
         mount: first.camera_mount,
         mounting: (&record.mountings[first.mounting].pose).into(),
-        placements: placements
-            .iter()
-            .map(|&k| (record.placements[k].name.clone(), (&record.placements[k].pose).into()))
-            .collect(),
+        placements: placed(&record.placements, &planned),
         plate: plate(record, first.plate),
         pixel_sigma_px: typical_sigma(&stops),
-        joint_sigma: camera.joint_noise.clone(),
+        joint_sigma: record.cameras[first.camera].joint_noise.clone(),
+        beside: Beside {
+            cameras: columns.cameras[1..].iter().map(camera).collect(),
+            mountings: placed(&record.mountings, &columns.mountings[1..]),
+            placements: placed(&record.placements, &columns.placements[planned.len()..]),
+        },
     };
     Ok((setting, stops))
+}
+
+/// Which cameras, mountings and placements of a record have columns, in their order.
+struct Columns {
+    cameras: Vec<usize>,
+    mountings: Vec<usize>,
+    placements: Vec<usize>,
+}
+
+/// Those that are planned for, then the others that occur, in the order of the record.
+fn first_and_others(planned: &[usize], used: impl Iterator<Item = usize>) -> Vec<usize> {
+    let others: BTreeSet<usize> = used.filter(|k| !planned.contains(k)).collect();
+    planned.iter().copied().chain(others).collect()
+}
+
+/// The stops at which these images were taken: those of one place in a run are of one stop.
+fn stops(used: &[&ImageRecord], columns: &Columns, record: &SolutionRecord) -> Vec<PlannedStop> {
+    let run = |image: &ImageRecord| {
+        let series = record.series.iter().find(|s| s.name == image.series)?;
+        series.run.clone().zip(image.row)
+    };
+    let mut places: BTreeMap<(String, usize), usize> = BTreeMap::new();
+    let mut stops: Vec<PlannedStop> = Vec::new();
+    for image in used {
+        let Some(PlannedStop { posture, images }) = taken(image, columns, record) else { continue };
+        let place = run(image);
+        match place.as_ref().and_then(|place| places.get(place)).and_then(|&k| stops.get_mut(k)) {
+            Some(stop) => stop.images.extend(images),
+            None => {
+                places.extend(place.map(|place| (place, stops.len())));
+                stops.push(PlannedStop { posture, images });
+            }
+        }
+    }
+    stops
 }
 
 /// The smallest robot model that has all joint terms of a solution.
@@ -139,22 +174,24 @@ fn plate(record: &SolutionRecord, index: usize) -> Plate {
 }
 
 /// A stop of the solution, with the observations in use at the place where they are predicted; `None` off the robot.
-fn taken(image: &ImageRecord, placement: usize, pixel_factor: f64, record: &SolutionRecord) -> Option<PlannedStop> {
+fn taken(image: &ImageRecord, columns: &Columns, record: &SolutionRecord) -> Option<PlannedStop> {
     let plate = &record.plates[image.plate];
+    let pixel_factor = record.cameras[image.camera].pixel_factor;
+    let column = |all: &[usize], own: usize| all.iter().position(|k| *k == own);
     let posture = Posture { readings: image.readings.clone()?, approach: image.approach.clone() };
     let image = Image {
         name: image.name.clone(),
         series: 0,
         stop: 0,
-        camera: 0,
-        mounting: 0,
-        placement,
+        camera: column(&columns.cameras, image.camera)?,
+        mounting: column(&columns.mountings, image.mounting)?,
+        placement: column(&columns.placements, image.placement)?,
         plate: 0,
         mount: image.camera_mount,
         observations: observations(&image.observations, pixel_factor, &plate.id).into(),
         rejected: None,
     };
-    Some(PlannedStop { posture, image })
+    Some(PlannedStop { posture, images: vec![image] })
 }
 
 fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) -> Vec<MarkerObservation> {
@@ -179,11 +216,13 @@ fn observations(columns: &ObservationColumns, pixel_factor: f64, ids: &[u32]) ->
     all
 }
 
-/// Median standard deviation of an observation, px.
+/// Median standard deviation of an observation of the camera that is planned for, px.
 fn typical_sigma(stops: &[PlannedStop]) -> f64 {
     let mut all: Vec<f64> = stops
         .iter()
-        .flat_map(|s| s.image.observations.iter())
+        .flat_map(|s| &s.images)
+        .filter(|image| image.camera == 0)
+        .flat_map(|image| image.observations.iter())
         .map(|o| (2.0 / o.information.trace().max(f64::MIN_POSITIVE)).sqrt())
         .collect();
     all.sort_by(f64::total_cmp);
@@ -192,11 +231,67 @@ fn typical_sigma(stops: &[PlannedStop]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::DMatrix;
+
     use super::from_solution;
     use crate::identify::RobotModel;
     use crate::output::restore::{chain, robot_description};
-    use crate::output::solution_json::SolutionRecord;
+    use crate::output::solution_json::{ImageRecord, SeriesRecord, SolutionRecord};
+    use crate::plan::information::stop_information;
+    use crate::plan::setting::PlannedStop;
+    use crate::problem::Image;
     use crate::series::CameraMount;
+
+    /// Images of every camera that shows the plate count, in the hand or not; those of another plate do not.
+    #[test]
+    fn images_of_all_cameras_that_show_the_plate_are_counted() {
+        let mut record = SolutionRecord::with_both_mounts();
+        record.cameras.push(record.cameras[0].clone());
+        record.images.iter_mut().skip(12).for_each(|i| i.camera = 1);
+        let start = |record: &SolutionRecord| {
+            let own =
+                chain(record, &robot_description(record).unwrap(), &record.robot.base, &record.robot.tip).unwrap();
+            from_solution(record, own, RobotModel::Rigid).unwrap()
+        };
+        let (mut setting, stops) = start(&record);
+        assert_eq!((stops.len(), setting.beside.cameras.len(), setting.beside.placements.len()), (24, 1, 1));
+        let new = [("new".to_owned(), setting.placements[0].1)];
+        let stops = setting.with_further_placements(new.to_vec(), stops);
+        let of_second = stops[12..].iter().flat_map(|s| &s.images);
+        assert!(
+            of_second.clone().all(|i| (i.camera, i.mounting, i.placement, i.mount) == (1, 1, 2, CameraMount::Fixed))
+        );
+        let planned = setting.adjustment();
+        assert_eq!(planned.state.placements[2].translation, setting.beside.placements[0].1.translation);
+        // Every joint is better known by both cameras than by either.
+        let twists = planned.problem.layout.twists.clone();
+        let known = |stops: &[PlannedStop]| {
+            let all: DMatrix<f64> = stops.iter().filter_map(|stop| stop_information(&planned, stop)).sum();
+            twists.clone().map(|k| all[(k, k)]).collect::<Vec<f64>>()
+        };
+        let [first, second, both] = [&stops[..12], &stops[12..], &stops[..]].map(known);
+        assert!((0..both.len()).all(|k| both[k] >= first[k].max(second[k])) && both.iter().sum::<f64>() > 0.0);
+        // Two cameras at one stop see through the same joint noise: of one place they say less of the robot than at two stops.
+        let mut together = record.clone();
+        let other = SeriesRecord { name: "second".into(), ..together.series[0].clone() };
+        together.series.push(other);
+        together.series.iter_mut().for_each(|s| s.run = Some("run".into()));
+        together.images.truncate(12);
+        together.images.iter_mut().enumerate().for_each(|(k, image)| image.row = Some(k));
+        let second = |i: &ImageRecord| ImageRecord { camera: 1, series: "second".into(), ..i.clone() };
+        together.images.extend(together.images.clone().iter().map(second));
+        let (_, at_once) = start(&together);
+        assert_eq!(at_once.iter().map(|s| s.images.len()).collect::<Vec<_>>(), vec![2; 12]);
+        let apart = |stop: &PlannedStop| {
+            let of = |image: &Image| PlannedStop { posture: stop.posture.clone(), images: vec![image.clone()] };
+            stop.images.iter().map(of).collect::<Vec<_>>()
+        };
+        let apart: Vec<PlannedStop> = at_once.iter().flat_map(apart).collect();
+        assert!(known(&at_once).iter().sum::<f64>() < known(&apart).iter().sum::<f64>());
+        record.plates.push(record.plates[0].clone());
+        record.images.iter_mut().skip(12).for_each(|i| i.plate = 1);
+        assert_eq!(start(&record).1.len(), 12);
+    }
 
     #[test]
     fn further_images_are_of_plates_that_the_camera_can_see() {
@@ -205,8 +300,9 @@ mod tests {
         let of_first = |record: &SolutionRecord| {
             let (setting, stops) = from_solution(record, own.clone(), RobotModel::Rigid).unwrap();
             let names: Vec<String> = setting.placements.iter().map(|p| p.0.clone()).collect();
-            assert!(stops.iter().all(|s| s.image.placement == 0 && s.image.mount == setting.mount));
-            (setting.mount, names, stops.len())
+            let own = stops.iter().flat_map(|s| &s.images).filter(|i| i.mounting == 0);
+            assert!(own.clone().all(|i| i.placement == 0 && i.mount == setting.mount));
+            (setting.mount, names, own.count())
         };
         assert_eq!(of_first(&record), (CameraMount::Hand, vec!["placement_0".to_owned()], 12));
         record.images.rotate_left(12);
