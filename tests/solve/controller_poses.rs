@@ -130,6 +130,10 @@ fn hand_eye_transform_and_noise_are_found_without_a_robot() {
     for name in ["camera.yaml", "hand_camera.yaml", "plate_pose.yaml", "solution.json"] {
         assert!(files.contains_key(name), "{name} is missing");
     }
+    // Between the poses of the stops the model in the controller errs in another way: the promise is of these alone.
+    let report = String::from_utf8(files["report.html"].clone()).unwrap();
+    let promise = report.split("<h2>Accuracy of the flange</h2>").nth(1).unwrap().split("<h2>").next().unwrap();
+    assert!(promise.contains("at the poses of the stops") && !promise.contains("region of the stops"), "{promise}");
     for part in ["urdf", "kinematics", "mdh", "mastering", "compensation"] {
         assert!(files.keys().all(|name| !name.contains(part)), "{part} of no robot");
     }

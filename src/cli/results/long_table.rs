@@ -136,8 +136,9 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let mm = |m: f64| format!("{:>8.3} mm", 1e3 * m);
     writeln!(
         out,
-        "flange    expected error of its position relative to {} in the region of the stops, by model and covariance, RMS:",
-        r.flange_is_relative_to()
+        "flange    expected error of its position relative to {} {}, by model and covariance, RMS:",
+        r.flange_is_relative_to(),
+        r.flange_holds()
     )?;
     let (alone_m, _) = e.best_urdf_m();
     if r.has_no_robot() {
@@ -149,7 +150,7 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         let scatter_mm = 1e3 * e.scatter_m;
         return writeln!(
             out,
-            "          {scatter_mm:.3} mm of it is how these poses are off from stop to stop: errors of the controller's own model of the robot among them, which --urdf takes away"
+            "          {scatter_mm:.3} mm of it is how these poses are off from stop to stop: errors of the controller's own model of the robot among them, which are others between them; --urdf takes them away"
         );
     }
     writeln!(out, "          nominal    {}   base and tool that fit it best", mm(e.nominal_m))?;

@@ -103,7 +103,8 @@ fn flange(r: &SolutionRecord) -> Vec<String> {
     let told = if e.intervals.is_some() { " (95 % interval)" } else { "" };
     let i = e.intervals.as_ref();
     let (alone_m, of_alone) = e.best_urdf_m();
-    let mut lines = vec![format!("accuracy  expected flange error in the range of the stops, RMS{told}:")];
+    let at = if r.has_no_robot() { r.flange_holds() } else { "in the range of the stops" };
+    let mut lines = vec![format!("accuracy  expected flange error {at}, RMS{told}:")];
     if r.has_no_robot() {
         lines.push(row("poses of the controller", alone_m, of_alone));
     } else {
@@ -129,7 +130,7 @@ fn flange_in_brief(r: &SolutionRecord) -> Vec<String> {
         if r.beyond_urdf() { format!(", {:.3} with compensation.toml", 1e3 * e.model_m) } else { String::new() };
     let (alone_mm, nominal_mm) = (1e3 * e.best_urdf_m().0, 1e3 * e.nominal_m);
     let words = match r.has_no_robot() {
-        true => format!("not valid: flange {alone_mm:.3} mm by the poses of the controller"),
+        true => format!("not valid: flange {alone_mm:.3} mm at the poses of the stops, by the controller"),
         false => format!("not valid: flange {nominal_mm:.3} mm nominal, {alone_mm:.3} URDF{whole}"),
     };
     vec![indented("accuracy", &words)]

@@ -91,15 +91,15 @@ fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
             } } }
         } }
         p.note {
-            "Position of the flange relative to " (r.flange_is_relative_to()) " in the region of the stops, by model and covariance"
+            "Position of the flange relative to " (r.flange_is_relative_to()) " " (r.flange_holds()) ", by model and covariance"
             @if !r.has_no_robot() { "; the nominal robot with the base and the tool that fit it best" } ". " (significant(1e3 * e.scatter_m))
             @if r.has_no_robot() {
                 " mm of it is how the poses of the controller are off from stop to stop: errors of its own model of the robot among them, which a run with "
-                code { "--urdf" } " takes away. "
+                code { "--urdf" } " takes away. Between these poses those errors are others, and the flange may be off by more. "
             } @else {
                 " mm of each is noise from stop to stop, which no model takes away. "
             }
-            "This is the figure to quote; " a href="#workspace" { "elsewhere in the workspace" } " it is larger."
+            "This is the figure to quote" @if r.has_no_robot() { " at these poses" } "; " a href="#workspace" { "elsewhere in the workspace" } " it is larger."
         }
     }
 }

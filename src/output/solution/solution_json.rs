@@ -512,6 +512,12 @@ impl SolutionRecord {
         if self.images.is_empty() { "the base and tool that fit the stops" } else { "the plate" }
     }
 
+    /// Where the stated errors of the flange hold, in words. Between the poses of a controller its model of the robot errs in another way than at
+    /// them, and nothing was found of that.
+    pub fn flange_holds(&self) -> &'static str {
+        if self.has_no_robot() { "at the poses of the stops" } else { "in the region of the stops" }
+    }
+
     /// The file that was written under a name that ends so.
     pub fn file_ending_with(&self, end: &str) -> Option<&str> {
         self.files.iter().find(|f| f.ends_with(end)).map(String::as_str)
