@@ -274,6 +274,7 @@ mod tests {
 
     use super::*;
     use crate::diagnose::LooseMounting;
+    use crate::series::CameraMount;
 
     #[test]
     fn every_check_is_named_after_its_file() {
@@ -290,8 +291,15 @@ mod tests {
     #[test]
     fn a_camera_of_another_series_is_loose_whatever_the_poses_of_one_are() {
         let loose = |mounting: &str| {
-            let (mounting, images) = (mounting.to_owned(), Vec::new());
-            Finding::from(LooseMounting { mounting, turn: "yaw", angle_rad: 0.01, spread_rad: 0.001, images, of: 20 })
+            Finding::from(LooseMounting {
+                mounting: mounting.to_owned(),
+                mount: CameraMount::Hand,
+                turn: "yaw",
+                angle_rad: 0.01,
+                spread_rad: 0.001,
+                images: Vec::new(),
+                of: 20,
+            })
         };
         assert!(follows_from_tool(&loose("of_poses"), &["of_poses"]));
         assert!(!follows_from_tool(&loose("of_joints"), &["of_poses"]));

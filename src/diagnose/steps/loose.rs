@@ -178,8 +178,10 @@ impl TwoPlaces {
     }
 
     fn loose_mounting(&self, fit: &Fit, mounting: usize) -> LooseMounting {
+        let image = fit.problem.images.iter().find(|image| image.mounting == mounting);
         LooseMounting {
             mounting: fit.problem.mountings[mounting].clone(),
+            mount: image.map_or(CameraMount::Hand, |image| image.mount),
             turn: TURNS[self.axis - 3],
             angle_rad: self.distance,
             spread_rad: self.spread,

@@ -2,6 +2,7 @@
 
 use crate::diagnose::kind::{Kind, Quantity, Subject, some_of};
 use crate::error::Code;
+use crate::series::CameraMount;
 
 /// Most images that are named.
 const MOST_IMAGES: usize = 5;
@@ -11,6 +12,8 @@ const MOST_IMAGES: usize = 5;
 pub struct LooseMounting {
     /// Name of the mounting.
     pub mounting: String,
+    /// Where its camera is.
+    pub mount: CameraMount,
     /// About which axis of the camera: pitch, yaw, roll.
     pub turn: &'static str,
     /// Angle between the positions, rad.
@@ -38,12 +41,20 @@ impl Kind for LooseMounting {
     }
 
     fn place(&self) -> String {
-        format!("camera mount {}", self.mounting)
+        let held_by = match self.mount {
+            CameraMount::Hand => "mount",
+            CameraMount::Fixed => "stand",
+        };
+        format!("camera {held_by} {}", self.mounting)
     }
 
     fn seen(&self) -> String {
+        let loose = match self.mount {
+            CameraMount::Hand => "it is loose on its mount or slips",
+            CameraMount::Fixed => "its stand, or the plate on the tip, is loose or slips",
+        };
         format!(
-            "the {} of the camera has two values {:.2} mrad apart ({} of {} images: {}): it is loose on its mount or slips, or a joint has backlash",
+            "the {} of the camera has two values {:.2} mrad apart ({} of {} images: {}): {loose}, or a joint has backlash",
             self.turn,
             1e3 * self.angle_rad,
             self.images.len(),
@@ -53,6 +64,12 @@ impl Kind for LooseMounting {
     }
 
     fn remedy(&self) -> String {
-        "fasten it and take the series again; if it is fast, look for a joint with play".into()
+        match self.mount {
+            CameraMount::Hand => "fasten it and take the series again; if it is fast, look for a joint with play",
+            CameraMount::Fixed => {
+                "fasten the stand of the camera, and the plate on the tip, and take the series again; if both are fast, look for a joint with play"
+            }
+        }
+        .into()
     }
 }
