@@ -6,6 +6,7 @@ use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
 use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries, intern, stop_name};
+use crate::series::JointsBeside;
 
 /// A place is that of a marker from which it is no farther, m: what a file rounds.
 const AT_MARKER_M: f64 = 1e-5;
@@ -58,6 +59,8 @@ pub struct Touches {
     pub contacts: Vec<String>,
     /// Name of the frame of the known places; `None` where none is known.
     pub frame: Option<String>,
+    /// Joints beside the chain, which may have moved what was touched.
+    pub beside: JointsBeside,
     /// Measurements.
     pub all: Vec<Touch>,
 }

@@ -13,7 +13,7 @@ use super::observation::ImageObservations;
 use super::plate::Plate;
 use super::run::Run;
 use super::spatial::SpatialFiles;
-use super::units;
+use super::units::{self, JointsBeside};
 use crate::error::{Code, Error, Notice, Result};
 use crate::files::{self, FileKind};
 use crate::urdf::Chain;
@@ -131,6 +131,11 @@ impl Series {
             return Vec::new();
         }
         units::notices(&self.readings_file(), (&self.stops, self.run.is_some()), self.joint_unit(), chain)
+    }
+
+    /// Joints that a chain does not need: those whose columns differ, and those without one.
+    pub fn joints_beside(&self, chain: &Chain) -> JointsBeside {
+        JointsBeside::of(&self.stops, chain)
     }
 
     /// The file that says where the robot stood, for messages.

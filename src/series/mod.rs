@@ -78,5 +78,5 @@ pub(crate) use table::{Row, Table, csv_line, to_csv};
 pub use tag_plates::regions;
 pub use tags::{Region, TagPrint, Tags, dictionary_named};
 pub(crate) use toml_file::read_toml;
-pub use units::{LENGTH_UNITS, LengthUnit, check_unit};
+pub use units::{JointsBeside, LENGTH_UNITS, LengthUnit, check_unit};
 pub use without_robot::{read_without_robot, series_of_images};

@@ -285,12 +285,48 @@ pub(super) fn notices(file: &Path, (stops, view): (&Stops, bool), unit: AngleUni
     notices
 }
 
-/// Whether a column differs from stop to stop, by more than noise and otherwise than a clock or a counter.
-fn varies(stops: &Stops, joint: &str) -> bool {
-    let Some(column) = stops.joints.iter().position(|j| j == joint) else { return false };
-    let readings: Vec<f64> = stops.stops.iter().filter_map(|s| s.raw_readings.as_ref()?.get(column).copied()).collect();
+fn column(stops: &Stops, joint: &str) -> Vec<f64> {
+    let Some(column) = stops.joints.iter().position(|j| j == joint) else { return Vec::new() };
+    stops.stops.iter().filter_map(|s| s.raw_readings.as_ref()?.get(column).copied()).collect()
+}
+
+/// Whether a column differs from stop to stop, by more than noise.
+fn differs(stops: &Stops, joint: &str) -> bool {
+    let readings = column(stops, joint);
     let (low, high) = readings.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(*q), h.max(*q)));
-    high - low > UNMOVED && !readings.windows(2).all(|pair| pair[0] < pair[1])
+    high - low > UNMOVED
+}
+
+/// Whether a column differs, and otherwise than a clock or a counter.
+fn varies(stops: &Stops, joint: &str) -> bool {
+    differs(stops, joint) && !column(stops, joint).windows(2).all(|pair| pair[0] < pair[1])
+}
+
+/// Joints of the URDF that a chain does not need.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct JointsBeside {
+    /// Those whose columns differ from stop to stop.
+    pub moved: Vec<String>,
+    /// Those without a column.
+    pub untold: Vec<String>,
+}
+
+impl JointsBeside {
+    /// Of readings beside a chain.
+    pub(super) fn of(stops: &Stops, chain: &Chain) -> Self {
+        let (told, untold): (Vec<String>, Vec<String>) =
+            chain.beside.iter().cloned().partition(|joint| stops.joints.contains(joint));
+        Self { moved: told.into_iter().filter(|joint| differs(stops, joint)).collect(), untold }
+    }
+
+    /// Adds those of other stops.
+    pub fn add(&mut self, other: Self) {
+        for (own, other) in [(&mut self.moved, other.moved), (&mut self.untold, other.untold)] {
+            own.extend(other);
+            own.sort();
+            own.dedup();
+        }
+    }
 }
 
 /// Columns that are read, and of which no joint term makes use.

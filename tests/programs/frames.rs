@@ -13,18 +13,17 @@ use robotcal::frames::{Given, KnownRobot, Seen, Touches, fit};
 use robotcal::geom::Pose;
 use robotcal::identify::{mirror_image, touch_mistake};
 use robotcal::model::inverse::{reading_limits, solve_from};
-use robotcal::model::robot::Robot;
+use robotcal::model::robot::{Posture, Robot};
 use robotcal::output::frame_findings::frame_findings;
 use robotcal::output::frames_record::{self, ToolKind};
-use robotcal::output::restore::found_model;
+use robotcal::output::restore::{found_model, robot_description};
 use robotcal::output::solution_json;
 use robotcal::output::work_findings::from_below;
 use robotcal::simulate::truth::Truth;
 
 use crate::programs_support::touching::{Toucher, ranges, spread, write};
 use crate::programs_support::{Run, findings};
-use crate::robots::KR6;
-use crate::robots::repo;
+use crate::robots::{KR6, kr6_and_positioner, positioner, repo};
 use crate::said::assert_says;
 
 const TOOL: [f64; 3] = [0.012, -0.02, 0.11];
@@ -418,6 +417,92 @@ fn bad_touches_are_refused_by_file_and_place() {
         2,
         Code::FileMissing,
         &["touches", "contacts.csv"],
+    );
+}
+
+/// A work object that stands still does not go with the table of a positioner, in which the solution is: no tip is loose.
+#[test]
+fn places_that_do_not_go_with_a_carried_base_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (cell, series, result) = (kr6_and_positioner(folder.path()), at("series"), at("result"));
+    let ends = ["--urdf", cell.to_str().unwrap(), "--base", "table", "--tip", "link_6"];
+    let simulated = ["simulate", "--images", "30", "--observations", "--held-out", "0"];
+    robotcal(&[&simulated[..], &ends].concat(), Path::new(&series)).expect(0);
+    robotcal(&[&["identify", "--series", &series, "--robot-model", "rigid"][..], &ends].concat(), Path::new(&result));
+    let record = solution_json::read(&std::fs::read(at("result/solution.json")).unwrap()).unwrap();
+    let found = found_model(&record).unwrap();
+    let robot = found.known_robot(None).unwrap();
+    let readings = &robot.exported().chain.readings;
+    let carrying: Vec<usize> =
+        (0..readings.len()).filter(|&k| ["tilt", "turn"].contains(&readings[k].as_str())).collect();
+    assert_eq!(carrying.len(), 2, "{readings:?}");
+    let mut rng = rng(12);
+    let q = spread(&ranges(&robot.stops), 20, &mut rng);
+    let mut held = q.clone();
+    held.iter_mut().for_each(|row| carrying.iter().for_each(|&k| row[k] = q[0][k]));
+    let truth = robot.exported().clone();
+    let toucher = Toucher { truth: &truth, work: work(), tool: TOOL.into(), sigma_m: 5e-5, joint_sigma: 2e-5 };
+    let limits = Limits::default();
+    let told = |moved: &[Vec<f64>], rng: &mut ChaCha8Rng| {
+        let mut touches = toucher.places(&held, "fixture", rng);
+        touches.postures = moved.iter().map(|q| Posture::at(q)).collect();
+        let given = Given { tool: None, plate: None };
+        let fitted = fit(&robot, &touches, &given, &limits).unwrap();
+        touch_mistake(&robot, &touches, &given, (&fitted, &limits))
+    };
+    assert!(told(&held, &mut rng).is_none());
+    let mistake = told(&q, &mut rng).unwrap();
+    // Points of 0.05 mm, and as much again of the joint noise at a metre.
+    assert!(mistake.misfit > 1e-2 && mistake.misfit_undone.unwrap() < 3e-4, "{mistake:?}");
+    assert_says(&Finding::from(mistake).notice(), Code::WorkNotCarried, &["tilt", "turn"]);
+}
+
+/// Joints that the solution does not pass may carry what is touched: where they moved, or may have moved unseen, they are named.
+#[test]
+fn joints_beside_the_chain_that_moved_between_touches_are_named() {
+    let world = world();
+    let folder = tempfile::tempdir().unwrap();
+    let mut record = solution_json::read(&std::fs::read(repo(SOLUTION)).unwrap()).unwrap();
+    let end = record.urdf.text.rfind("</robot>").unwrap();
+    record.urdf.text.insert_str(end, &positioner(0.55, 0.5));
+    let solution = folder.path().join("solution.json");
+    std::fs::write(&solution, solution_json::to_bytes(&record).unwrap()).unwrap();
+    let table = Robot::nominal(robot_description(&record).unwrap().chain(Some("base_link"), Some("table")).unwrap());
+    let mut rng = rng(13);
+    let q = spread(&ranges(&world.robot.stops), 20, &mut rng);
+    let turns = spread(&[(-0.05, 0.05), (-0.05, 0.05)], 20, &mut rng);
+    let on_table = table.base_from_tip(&[0.0, 0.0]).inverse() * work();
+    let toucher = |turn: &[f64]| Toucher {
+        truth: &world.truth,
+        work: table.base_from_tip(turn) * on_table,
+        tool: TOOL.into(),
+        sigma_m: 5e-5,
+        joint_sigma: 2e-5,
+    };
+    let mut touches = toucher(&[0.0, 0.0]).places(&q, "fixture", &mut rng);
+    for (k, turn) in turns.iter().enumerate() {
+        touches.all[k].seen = Seen::Point(toucher(turn).touched(&q[k], &mut rng));
+    }
+    let head = "base = \"base_link\"\ntip = \"tool0\"\n[contact]\nsigma_m = 0.00005\nframe = \"fixture\"\n";
+    let mut joints = world.truth.chain.readings.clone();
+    let found = |touches: &Touches, joints: &[String], name: &str| {
+        let series = write(&folder.path().join(name), joints, touches, head);
+        let args = ["frames", "--from", solution.to_str().unwrap(), "--touches", series.to_str().unwrap()];
+        let run = robotcal(&args, &folder.path().join(format!("{name}_frames"))).expect(1);
+        let record = frames_record::read(&run.file("frames.json")).unwrap();
+        let scatter = record.findings.into_iter().find(|f| f.code == Code::TouchesScatter);
+        scatter.unwrap_or_else(|| panic!("{}", run.said()))
+    };
+    let untold = found(&touches, &joints, "untold");
+    assert_eq!((untold.quantities["joints_moved"], untold.quantities["joints_untold"]), (0.0, 2.0));
+    joints.extend(table.chain.readings.clone());
+    touches.postures.iter_mut().zip(&turns).for_each(|(posture, turn)| posture.readings.extend(turn));
+    let moved = found(&touches, &joints, "told");
+    assert_eq!((moved.quantities["joints_moved"], moved.quantities["joints_untold"]), (2.0, 0.0));
+    assert!(
+        ["tilt", "turn"].iter().all(|joint| moved.text.contains(joint) && untold.text.contains(joint)),
+        "{moved:?}"
     );
 }
 

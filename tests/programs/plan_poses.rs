@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::robots::positioner;
+use crate::robots::{kr6_and_positioner, positioner};
 use crate::said::assert_says;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use robotcal::geom::{OrientedBox, Pose};
@@ -509,28 +509,19 @@ fn names_cannot_become_statements_of_the_planned_programs() {
     }
 }
 
-/// A positioner before the KR 6, as a file; its table is a base that joints carry.
-fn positioner_file(folder: &Path) -> PathBuf {
-    let text = std::fs::read_to_string(urdf("kuka_kr6_r900")).unwrap();
-    let end = text.rfind("</robot>").unwrap();
-    let path = folder.join("cell.urdf");
-    std::fs::write(&path, format!("{}{}{}", &text[..end], positioner(0.55, 0.5), &text[end..])).unwrap();
-    path
-}
-
 /// A solution has base and tip: further poses are planned between them, of the URDF in it as well as of one that is given.
 #[test]
 fn further_poses_of_a_cell_are_planned_between_the_links_of_the_result() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (cell, series, result) = (positioner_file(folder.path()), at("series"), at("result"));
+    let (cell, series, result) = (kr6_and_positioner(folder.path()), at("series"), at("result"));
     let cell = cell.to_str().unwrap();
     let ends = ["--urdf", cell, "--base", "table", "--tip", "link_6"];
     let made = ["simulate", "--images", "30", "--observations", "--held-out", "0", "--out", &series];
     let (code, _, error) = run(&[&made[..], &ends].concat());
     assert_eq!(code, 0, "{error}");
     let (code, _, error) =
-        run(&[&["identify", &series, "--robot-model", "rigid", "--out", &result][..], &ends].concat());
+        run(&[&["identify", "--series", &series, "--robot-model", "rigid", "--out", &result][..], &ends].concat());
     assert!(code <= 1, "{error}");
     let from = format!("{result}/solution.json");
     let plan = |name: &str, more: &[&str]| {
@@ -552,7 +543,7 @@ fn further_poses_of_a_cell_are_planned_between_the_links_of_the_result() {
 #[test]
 fn what_is_out_of_reach_of_a_carried_base_is_measured_from_the_foot_of_the_arm() {
     let folder = tempfile::tempdir().unwrap();
-    let (plate, cell) = (plate_file(folder.path()), positioner_file(folder.path()));
+    let (plate, cell) = (plate_file(folder.path()), kr6_and_positioner(folder.path()));
     let out = folder.path().join("plan");
     let base = [
         "plan",

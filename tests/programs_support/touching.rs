@@ -12,6 +12,7 @@ use rand_distr::{Distribution, StandardNormal};
 use robotcal::frames::{Seen, Touch, Touches};
 use robotcal::geom::Pose;
 use robotcal::model::robot::{Posture, Robot};
+use robotcal::series::JointsBeside;
 
 /// What touches.
 pub struct Toucher<'a> {
@@ -59,6 +60,7 @@ impl Toucher<'_> {
             bodies: vec!["contact".into()],
             contacts: Vec::new(),
             frame: Some(frame.to_owned()),
+            beside: JointsBeside::default(),
         }
     }
 }

@@ -130,7 +130,7 @@ fn what_is_loose_is_named_by_where_the_camera_is() {
         }
         let solution = solved(&series);
         let loose = solution.findings.iter().find_map(|f| match f {
-            Finding::LooseMounting(loose) => Some((loose, f.place())),
+            Finding::LooseMounting(loose) => Some((loose, f.notice().place)),
             _ => None,
         });
         let (loose, place) = loose.unwrap_or_else(|| panic!("{mount:?}: {:?}", solution.findings));

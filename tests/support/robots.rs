@@ -45,6 +45,15 @@ pub fn made_with() -> String {
     format!("Made with robotcal {}, commit {}.\n", env!("CARGO_PKG_VERSION"), commit.unwrap_or_default().trim())
 }
 
+/// The KR 6 with a [`positioner`] before it, as a file in a folder.
+pub fn kr6_and_positioner(folder: &Path) -> PathBuf {
+    let text = std::fs::read_to_string(kr6_urdf()).unwrap();
+    let end = text.rfind("</robot>").unwrap();
+    let path = folder.join("cell.urdf");
+    std::fs::write(&path, format!("{}{}{}", &text[..end], positioner(0.55, 0.5), &text[end..])).unwrap();
+    path
+}
+
 /// Links and joints of a positioner of two axes, so far before `base_link` (m) and tilted by so much at most (rad); its last link is `table`.
 pub fn positioner(before_m: f64, tilt_rad: f64) -> String {
     format!(

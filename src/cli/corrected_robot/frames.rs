@@ -28,7 +28,7 @@ use crate::output::solution_json::SolutionRecord;
 use crate::output::work_findings::{carried, from_below, other_frame};
 use crate::output::{ResultFolder, folder_name, plan_files, touch_plan};
 use crate::problem::MeasuredSeries;
-use crate::series::{self, InputFile, Series};
+use crate::series::{self, InputFile, JointsBeside, Series};
 use crate::urdf::{RobotDescription, patch_origins};
 
 /// Flags of `frames`.
@@ -257,12 +257,13 @@ fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotD
     let chain = chain(record, description, &record.robot.base, &record.robot.tip)?;
     let (mut all, mut files, mut notices, mut as_planned): (Vec<MeasuredSeries>, Vec<_>, Vec<_>, Vec<_>) =
         Default::default();
-    let mut plans = Vec::new();
+    let (mut plans, mut beside) = (Vec::new(), JointsBeside::default());
     for folder in &args.touches {
         holds_touches(folder)?;
         let s = series::read(folder)?;
         same_links(&s, record)?;
         let measured = measure_bodies(&s, &chain, false)?;
+        beside.add(s.joints_beside(&chain));
         files.extend(s.inputs);
         notices.extend(measured.notices);
         let plan = folder.join(plan_files::FILE_NAME);
@@ -273,7 +274,8 @@ fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotD
         all.push(measured.series);
     }
     notices.extend(leave_out_repeated_bodies(&mut all)?);
-    Ok(Measured { touches: Touches::of(&all)?, files, plans, notices, as_planned })
+    let touches = Touches { beside, ..Touches::of(&all)? };
+    Ok(Measured { touches, files, plans, notices, as_planned })
 }
 
 /// Stops at which something was touched, with their readings.

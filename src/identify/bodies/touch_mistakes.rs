@@ -55,6 +55,8 @@ enum What {
         from: usize,
         moved: Pose,
     },
+    /// The touched places do not go with the base that these joints move.
+    NotCarried(Vec<String>),
     /// The place of the touches at these stops, or of those at others: any of them explains as much.
     OneOf(Vec<String>),
 }
@@ -206,6 +208,7 @@ fn explained(
         single.into_iter().map(with_given).collect(),
         tools.map(with_given).collect(),
         works.map(with_given).collect(),
+        not_carried(robot, touches).map(with_given).into_iter().collect(),
         given.tool.map(|tool| without_tool(touches, given, tool)).into_iter().collect::<Vec<Undone>>(),
     ];
     let all: Vec<Undone> = kinds.into_iter().flat_map(|undone| nearest(robot, undone)).collect();
@@ -283,7 +286,8 @@ fn nearest(robot: &KnownRobot, undone: Vec<Undone>) -> Vec<Undone> {
 
 /// What leaves fewer touches out is better, then what takes no more unknowns, then what fits better.
 fn rank((fit, undone): &(FrameFit, Undone), limits: &Limits) -> (usize, bool, f64) {
-    (left_out(fit), !matches!(undone.what, What::Kind(_)), fit.contradiction(limits))
+    let takes_more = !matches!(undone.what, What::Kind(_) | What::NotCarried(_));
+    (left_out(fit), takes_more, fit.contradiction(limits))
 }
 
 fn left_out(fit: &FrameFit) -> usize {
@@ -364,6 +368,22 @@ fn of_another_place(touches: &Touches, k: usize) -> Option<(Touches, What)> {
     Some((undone, What::Touch(k, place)))
 }
 
+/// With the joints that carry the base where they stood first: so the touches would be if the places stood still. `None` where nothing carries it, or
+/// these joints stand at all touches as at the first.
+fn not_carried(robot: &KnownRobot, touches: &Touches) -> Option<(Touches, What)> {
+    let chain = &robot.exported().chain;
+    let carrying = chain.joints.iter().take(chain.climbed()).filter_map(|joint| joint.drive);
+    let carrying: BTreeSet<usize> = carrying.map(|drive| drive.reading).collect();
+    let first = touches.postures.first()?.readings.clone();
+    let mut undone = touches.clone();
+    for posture in &mut undone.postures {
+        carrying.iter().for_each(|&k| posture.readings[k] = first[k]);
+    }
+    let moved = |k: &&usize| touches.postures.iter().any(|posture| posture.readings[**k] != first[**k]);
+    let names: Vec<String> = carrying.iter().filter(moved).map(|&k| chain.readings[k].clone()).collect();
+    (!names.is_empty()).then_some((undone, What::NotCarried(names)))
+}
+
 fn without_tool(touches: &Touches, given: &Given, tool: Pose) -> Undone {
     Undone { touches: touches.clone(), given: Given { tool: None, ..*given }, what: What::GivenTool(tool) }
 }
@@ -405,6 +425,7 @@ fn named(undone: &Undone, left: &FrameFit, touches: &Touches) -> MistakeKind {
         What::GivenTool(tool) => tool_elsewhere(tool, left),
         What::Tool { from } => tool_moved(&stop_at(*from, touches), left, touches),
         What::Work { from, moved } => work_elsewhere(&stop_at(*from, touches), moved, touches),
+        What::NotCarried(joints) => stands_still(joints),
     };
     MistakeKind::Poses { code, what, remedy }
 }
@@ -484,6 +505,18 @@ fn work_elsewhere(from: &str, moved: &Pose, touches: &Touches) -> Words {
         1e3 * log_so3(&moved.rotation).norm()
     );
     (Code::WorkDisplaced, what, before_or_after(from))
+}
+
+fn stands_still(joints: &[String]) -> Words {
+    let joints = joints.join(", ");
+    let what = format!(
+        "the touched places do not move with the base of the solution, which {joints} move: the work object stands still, or these joints did"
+    );
+    let remedy = format!(
+        "touch it with {joints} at one value, or in a solution whose base stands still (identify --base); if it is on the base, write the readings at \
+         which {joints} stood"
+    );
+    (Code::WorkNotCarried, what, remedy)
 }
 
 fn before_or_after(from: &str) -> String {

@@ -8,6 +8,7 @@ use crate::error::Code;
 use crate::frames::{FrameFit, Seen, Touches};
 use crate::geom::{Pose, adjoint};
 use crate::output::corrections::FileFinding;
+use crate::series::JointsBeside;
 
 /// Stops that are named.
 const NAMED: usize = 5;
@@ -23,7 +24,7 @@ pub fn frame_findings(
         return vec![of_mistake(mistake, subject)];
     }
     let mut all = left_out(fit, touches, limits, subject);
-    all.extend(scattered(fit, limits, subject));
+    all.extend(scattered((fit, &touches.beside), limits, subject));
     all.extend(robot_contradicted(fit, limits, subject));
     for (name, covariance) in touches.bodies.iter().zip(&fit.tool_covariances) {
         let Some(c) = covariance else { continue };
@@ -70,13 +71,29 @@ fn left_out(fit: &FrameFit, touches: &Touches, limits: &Limits, subject: &str) -
     all
 }
 
-fn scattered(fit: &FrameFit, limits: &Limits, subject: &str) -> Option<FileFinding> {
+fn scattered((fit, beside): (&FrameFit, &JointsBeside), limits: &Limits, subject: &str) -> Option<FileFinding> {
+    let cause = if beside.moved.is_empty() {
+        let untold = match beside.untold.is_empty() {
+            true => String::new(),
+            false => format!(", or a work object that {} moved, of which no column is given", beside.untold.join(", ")),
+        };
+        format!(
+            "a loose tip, another order of points, or the wrong robot{untold}; correct sigma_m if they are no better"
+        )
+    } else {
+        let joints = beside.moved.join(", ");
+        format!(
+            "{joints} differ between the touches, and the robot of the solution does not take that up: a work object that they carry moved; touch it with {joints} at one value, or in a solution whose base is the link that carries it (identify --base)"
+        )
+    };
     let text = format!(
-        "the touches scatter {:.1} times as much as their stated sigma ({:.3} mm RMS): a loose tip, another order of points, or the wrong robot; correct sigma_m if they are no better",
+        "the touches scatter {:.1} times as much as their stated sigma ({:.3} mm RMS): {cause}",
         fit.factor,
         1e3 * fit.rms_m
     );
-    let quantities = [("factor", fit.factor), ("rms_mm", 1e3 * fit.rms_m)];
+    let [moved, untold] = [&beside.moved, &beside.untold].map(|joints| joints.len() as f64);
+    let quantities =
+        [("factor", fit.factor), ("rms_mm", 1e3 * fit.rms_m), ("joints_moved", moved), ("joints_untold", untold)];
     let is_scattered = fit.factor > limits.touch_factor;
     is_scattered.then(|| FileFinding::new(Code::TouchesScatter, Weight::Gate, subject, quantities, text))
 }
