@@ -3,8 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use unicode_normalization::UnicodeNormalization;
-
 use super::controller_file;
 use super::controller_poses::ControllerPoses;
 use super::image_file;
@@ -20,7 +18,7 @@ use super::rotation_kind::RotationKind;
 use super::run::Run;
 use super::spatial::SpatialFiles;
 use super::stop_index::StopIndex;
-use super::table::Table;
+use super::table::{Table, composed};
 use super::views::{CameraView, Seen, has_mixed_mounts};
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::files;
@@ -306,27 +304,19 @@ fn pictured(
     stops: &mut Stops,
     notices: &mut Vec<Notice>,
 ) -> Result<Source> {
-    let on_disk = image_files(images)?;
-    let names: BTreeSet<String> = on_disk.iter().map(|p| file_name(p)).collect();
-    let others = other_files(images, &names)?;
+    let on_disk = by_name(image_files(images)?);
+    let names: BTreeSet<String> = on_disk.keys().cloned().collect();
+    let others_on_disk = other_files(images, &names)?;
+    let others: BTreeSet<String> = others_on_disk.keys().cloned().collect();
     let mut missing = Vec::new();
-    let composed: BTreeMap<String, &String> = names.iter().map(|name| (name.nfc().collect(), name)).collect();
-    for stop in &mut stops.stops {
-        if stops.key == StopKey::Stop {
-            name_image(stop, &names);
-        }
-        // Some systems write an accent as a character of its own: to a person the names are the same.
-        if let Some(file) = composed.get(&stop.image.nfc().collect::<String>()).filter(|_| !names.contains(&stop.image))
-        {
-            stop.image.clone_from(file);
-        }
+    for stop in stops.stops.iter_mut().filter(|_| stops.key == StopKey::Stop) {
+        name_image(stop, &names);
     }
     for (stop, line) in stops.stops.iter_mut().zip(lines) {
         // What is no image by its name is looked at like one: what is wrong with it is said of it then.
-        if names.contains(&stop.image) || others.contains(&stop.image) {
-            stop.path = Some(images.join(&stop.image));
-        } else {
-            missing.push((*line, stop.image.clone()));
+        match on_disk.get(&stop.image).or_else(|| others_on_disk.get(&stop.image)) {
+            Some(path) => stop.path = Some(path.clone()),
+            None => missing.push((*line, stop.image.clone())),
         }
     }
     let remedy = |name: &str| match (similar(name, &names), similar(name, &others)) {
@@ -407,11 +397,17 @@ pub(super) fn image_files(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Names of the files of a folder that are no images by their names.
-fn other_files(folder: &Path, images: &BTreeSet<String>) -> Result<BTreeSet<String>> {
+fn other_files(folder: &Path, images: &BTreeSet<String>) -> Result<BTreeMap<String, PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, &e))?;
     let paths = entries.map(|entry| entry.map(|e| e.path()).map_err(|e| Error::io(folder, &e)));
     let paths = paths.collect::<Result<Vec<PathBuf>>>()?;
-    Ok(paths.iter().filter(|p| p.is_file()).map(|p| file_name(p)).filter(|name| !images.contains(name)).collect())
+    let all = by_name(paths.into_iter().filter(|p| p.is_file()).collect());
+    Ok(all.into_iter().filter(|(name, _)| !images.contains(name)).collect())
+}
+
+/// Files by their names as tables have them.
+fn by_name(files: Vec<PathBuf>) -> BTreeMap<String, PathBuf> {
+    files.into_iter().map(|path| (composed(&file_name(&path)).into_owned(), path)).collect()
 }
 
 /// A name on disk that differs by case or extension only.

@@ -1,7 +1,10 @@
 //! CSV tables with a header, whose every complaint names file, line and column.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::Path;
+
+use unicode_normalization::UnicodeNormalization;
 
 use super::inputs::{InputFile, read_text};
 use crate::error::{Code, Error, Result, closest_name, plain_name, renaming};
@@ -9,6 +12,12 @@ use crate::files::FileKind;
 
 /// Columns that name what a row is of: they usually stand first.
 const KEYS: [&str; 4] = ["image", "stop", "name", "id"];
+
+/// A name with each accent in its letter. Some systems write it as a character of its own: to a person the names are the same, and so they are in all
+/// tables.
+pub(super) fn composed(name: &str) -> Cow<'_, str> {
+    if name.is_ascii() { Cow::Borrowed(name) } else { Cow::Owned(name.nfc().collect()) }
+}
 
 /// One data row.
 #[derive(Debug, Clone, Copy)]
@@ -154,7 +163,7 @@ impl Table {
         self.lines.push(line);
         for (cell, column) in record.iter().zip(&self.headers) {
             plain_name(column, cell, format_args!("{}:{line}", self.file))?;
-            self.cells.push(cell);
+            self.cells.push(&composed(cell));
         }
         Ok(())
     }

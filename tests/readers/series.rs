@@ -381,6 +381,24 @@ fn a_name_with_an_accent_is_that_of_its_file_however_both_are_written() {
     }
 }
 
+/// Tables of one folder may have been written by different systems, too.
+#[test]
+fn a_name_with_an_accent_is_the_same_in_all_tables() {
+    let (composed, decomposed) = ("k\u{e4}fig.png", "ka\u{308}fig.png");
+    let observed = |name: &str| format!("image,marker,u,v\na.png,1,1,2\n{name},1,1,2\noff.png,0,3,4\n");
+    let touched = |name: &str| format!("stop,contact,x_m,y_m,z_m\n{name},p,,,\n");
+    for (row, other) in [(composed, decomposed), (decomposed, composed), (decomposed, decomposed)] {
+        let joints = JOINTS.replace("b.png", row);
+        let tables =
+            [("joints.csv", &*joints), ("observations.csv", &observed(other)), ("contacts.csv", &touched(other))];
+        let series = read(series_with(&tables).path()).unwrap();
+        assert!(series.notices.is_empty(), "{:?}", series.notices);
+        let Source::Observations(images) = &series.source else { panic!("{:?}", series.source) };
+        let names: Vec<_> = images.iter().map(|i| i.image.as_str()).collect();
+        assert_eq!(names, ["a.png", composed, "off.png"]);
+    }
+}
+
 #[test]
 fn observations_replace_images_and_are_checked_by_line() {
     let header = "image,marker,u,v,edge,cov_uu,cov_uv,cov_vv,du,dv,reason\n";
