@@ -539,6 +539,11 @@ fn mdh_parameters_say_what_they_leave() {
     let mdh = text(&files, "mdh.csv");
     let warned = |l: &str| ["# ", "joint_a2", "joint_a3"].iter().all(|name| l.contains(name));
     assert!(mdh.lines().any(warned), "the nearly parallel axes are named: {mdh}");
+    // The parameters are worth something between these links alone.
+    let chain = &solution.fit.state.robot.chain;
+    let ends = [&chain.base, &chain.tip].map(|link| format!("\"{link}\""));
+    let named = |l: &str| l.starts_with('#') && ends.iter().all(|end| l.contains(end));
+    assert!(mdh.lines().any(named), "{ends:?}: {mdh}");
     let numbers = |line: &str| -> Vec<f64> {
         let parts = line.split([' ', ',']);
         parts.filter_map(|p| p.parse().ok()).collect()

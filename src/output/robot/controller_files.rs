@@ -86,7 +86,9 @@ pub(super) fn mdh_csv(robot: &Robot, note: &str) -> String {
     let robot = Robot::nominal(robot.chain);
     let head = format!(
         "# Modified Denavit-Hartenberg parameters (Craig), for controllers and toolboxes that take no other model. Link i:\n\
-         # T = RotX(alpha_rad) TransX(a_m) RotZ(q + theta_offset_rad) TransZ(d_m) (prismatic: TransZ(d_m + q)); base and tip are full poses. {note}\n"
+         # T = RotX(alpha_rad) TransX(a_m) RotZ(q + theta_offset_rad) TransZ(d_m) (prismatic: TransZ(d_m + q)); base and tip are full poses. {note}\n\
+         # From base link \"{}\" to tip link \"{}\".\n",
+        robot.chain.base, robot.chain.tip
     );
     let mdh = match Mdh::of(&robot.chain) {
         Ok(mdh) => mdh,
