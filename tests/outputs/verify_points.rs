@@ -12,7 +12,7 @@ use robotcal::model::joint_terms::{JointTerm, Term};
 use robotcal::model::robot::Robot;
 use robotcal::simulate::truth::Truth;
 
-use crate::robots::kr6_urdf;
+use crate::robots::{kr6_and_positioner, kr6_urdf};
 use crate::verify_series::codes;
 
 /// A copy of a series with its first 24 stops.
@@ -287,6 +287,33 @@ fn points_that_do_not_belong_together_or_are_few_are_no_good_verdict() {
     let mut wrong = good;
     wrong.iter_mut().for_each(|p| p.readings[5] = -p.readings[5]);
     assert_eq!(code(&wrong), Some(3), "the sign of a joint");
+}
+
+/// A device on the floor does not see the points in the frame of the table that a positioner moves.
+#[test]
+fn points_in_another_base_frame_are_told_by_the_flag_of_the_base() {
+    let folder = tempfile::tempdir().unwrap();
+    let cell = kr6_and_positioner(folder.path());
+    let (_, arm) = kr6();
+    let on_floor = points(&arm, 40, NOISE_M);
+    let file = folder.path().join("points.csv");
+    let mut table = format!("x_m,y_m,z_m,{},tilt,turn\n", arm.chain.readings.join(","));
+    for (k, p) in on_floor.iter().enumerate() {
+        let numbers: Vec<String> = p.position_m.iter().chain(&p.readings).map(|v| format!("{v:.9}")).collect();
+        writeln!(table, "{},{},{}", numbers.join(","), 0.4 * (k as f64).sin(), 2.0 * (1.7 * k as f64).sin()).unwrap();
+    }
+    std::fs::write(&file, table).unwrap();
+    let verified = |base: &str| {
+        let mut command = Command::cargo_bin("robotcal").unwrap();
+        command.args(["verify", "--joint-unit", "rad", "--base", base, "--tip", "tool0", "--urdf"]);
+        let output = command.arg(&cell).arg("--points").arg(&file).output().unwrap();
+        (output.status.success(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (good, said) = verified("base_link");
+    assert!(good, "{said}");
+    let (good, said) = verified("table");
+    let named = [Code::PointsContradict.name(), "--base", "\"table\"", "tilt", "turn"];
+    assert!(!good && named.iter().all(|name| said.contains(name)), "{said}");
 }
 
 #[test]

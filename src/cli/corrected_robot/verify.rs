@@ -208,8 +208,19 @@ fn refuse_far(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Resu
         return Ok(());
     }
     let why = ": no error of a robot, but another robot or other readings";
-    let remedy = "check --joint-unit, the order of the joint columns, and the unit of the points (m)";
-    Err(contradict((model, urdf), file, why, remedy))
+    let mut remedy = "check --joint-unit, the order of the joint columns, and the unit of the points (m)".to_owned();
+    let chain = &model.robot.chain;
+    let carrying = chain.joints.iter().filter(|joint| joint.upwards && joint.drive.is_some()).map(|joint| &joint.name);
+    let others: Vec<&str> = carrying.chain(&chain.beside).map(String::as_str).collect();
+    // Of links that stand still to each other the frame of the device takes up which is the base.
+    if !others.is_empty() {
+        remedy += &format!(
+            "; and --base: the device has to stand still beside \"{}\", against which {} may move it",
+            chain.base,
+            others.join(", ")
+        );
+    }
+    Err(contradict((model, urdf), file, why, &remedy))
 }
 
 fn line(what: &str, urdf: &Path, Judged { fit, .. }: &Judged) -> String {
