@@ -58,4 +58,4 @@ pub use statistics::{Ratio, best_run, bootstrap_ratio, by_cluster, log_chance, m
 pub use stops::{Structural, ideal_stops, minimal_set, structural};
 pub use truth::{camera_errors_m, flange_error_m};
 pub use uncertainty::{NORMAL_95, Uncertainty, judge};
-pub use used_stops::{still, stops};
+pub use used_stops::{Standing, still, stops};

@@ -1,5 +1,7 @@
 //! The stops of the images in use, and what stands still while the robot moves.
 
+use std::collections::BTreeMap;
+
 use crate::geom::Pose;
 use crate::model::robot::Posture;
 use crate::problem::{Adjustment, Problem};
@@ -25,16 +27,72 @@ pub(super) fn shares_of_series(problem: &Problem) -> Vec<f64> {
     shares
 }
 
-/// What stands still in the base frame for the first image on the robot, with its first column: the plate, or a fixed camera; without images
+/// What stands still in the base frame while the robot moves, by its index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Standing {
+    /// The plate at a placement.
+    Placement(usize),
+    /// The fixed camera of a mounting.
+    Mounting(usize),
+}
+
+impl Standing {
+    /// For an image of a mounting and a placement.
+    pub const fn of(mount: CameraMount, mounting: usize, placement: usize) -> Self {
+        match mount {
+            CameraMount::Hand => Self::Placement(placement),
+            CameraMount::Fixed => Self::Mounting(mounting),
+        }
+    }
+
+    /// What stands still for most images; of several the first by name, so that the order of the series says nothing.
+    pub fn of_most<'a>(images: impl Iterator<Item = Self>, name: impl Fn(Self) -> &'a str) -> Option<Self> {
+        let mut images_of: BTreeMap<Self, usize> = BTreeMap::new();
+        images.for_each(|standing| *images_of.entry(standing).or_default() += 1);
+        let order = |(a, of_a): &(Self, usize), (b, of_b): &(Self, usize)| of_b.cmp(of_a).then(name(*a).cmp(name(*b)));
+        images_of.into_iter().min_by(order).map(|(standing, _)| standing)
+    }
+}
+
+/// What stands still in the base frame for most images on the robot, with its first column: the plate, or a fixed camera; without images
 /// an instrument.
 pub fn still(Adjustment { problem, state }: &Adjustment) -> Option<(Pose, usize)> {
     let layout = &problem.layout;
-    let Some(image) = problem.used_on_robot().next().map(|i| &problem.images[i]) else {
+    let images = problem.used_on_robot().map(|i| &problem.images[i]);
+    let name = |standing| match standing {
+        Standing::Placement(k) => problem.placements[k].as_str(),
+        Standing::Mounting(k) => problem.mountings[k].as_str(),
+    };
+    let standing = Standing::of_most(images.map(|i| Standing::of(i.mount, i.mounting, i.placement)), name);
+    let Some(standing) = standing else {
         let (_, measured) = problem.used_bodies().next()?;
         return Some((state.instruments[measured.instrument], layout.instruments[measured.instrument].start));
     };
-    Some(match image.mount {
-        CameraMount::Hand => (state.placements[image.placement], layout.placements[image.placement].start),
-        CameraMount::Fixed => (state.mountings[image.mounting], layout.mountings[image.mounting].start),
+    Some(match standing {
+        Standing::Placement(k) => (state.placements[k], layout.placements[k].start),
+        Standing::Mounting(k) => (state.mountings[k], layout.mountings[k].start),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Standing::{Mounting, Placement};
+    use super::*;
+
+    #[test]
+    fn what_stands_still_for_most_images_does_not_hang_on_their_order() {
+        let name = |standing| match standing {
+            Placement(k) => ["b", "a", "c"][k],
+            Mounting(_) => "camera",
+        };
+        let of = |images: &[Standing]| {
+            let turned: Vec<Standing> = images.iter().rev().copied().collect();
+            let found = Standing::of_most(images.iter().copied(), name);
+            assert_eq!(found, Standing::of_most(turned.into_iter(), name));
+            found
+        };
+        assert_eq!(of(&[Placement(0), Placement(2), Placement(2), Mounting(0)]), Some(Placement(2)));
+        assert_eq!(of(&[Placement(0), Placement(1), Mounting(0)]), Some(Placement(1)));
+        assert_eq!(of(&[]), None);
+    }
 }

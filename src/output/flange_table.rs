@@ -23,8 +23,8 @@ pub fn flange_at(model: &FoundModel, readings: &[Vec<f64>]) -> Result<Vec<Predic
     Ok(readings.iter().map(|q| flange.at(q)).collect())
 }
 
-/// What the flange is stated relative to, by its name among the parameters: of several placements of the plate (fixed cameras) that of the
-/// first image on the robot.
+/// What the flange is stated relative to, by its name among the parameters: of several placements of the plate (fixed cameras) that of
+/// most images on the robot.
 pub fn relative_to(model: &FoundModel) -> &str {
     let name = model.still.map(|(_, column)| model.layout.columns[column].name.as_str()).unwrap_or_default();
     name.rsplit_once('.').map_or(name, |(body, _)| body)

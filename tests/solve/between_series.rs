@@ -67,6 +67,19 @@ fn two_series_of_one_robot_are_not_accused() {
     }
 }
 
+/// The plate to which the errors of the flange are stated is not that of the series that happens to be named first.
+#[test]
+fn the_stated_accuracy_does_not_hang_on_the_order_of_the_series() {
+    let [monday, friday] = halves(&seen(24), |_, _| ());
+    let stated = |series: &[MeasuredSeries]| {
+        let flange = solved(series).uncertainty.flange.unwrap();
+        [flange.nominal_m, flange.urdf_m, flange.model_m]
+    };
+    let [one, other] = [stated(&[monday.clone(), friday.clone()]), stated(&[friday, monday])];
+    // What is left is where the solve stops.
+    assert!(one.iter().zip(&other).all(|(a, b)| (a / b - 1.0).abs() < 1e-4), "{one:?} {other:?}");
+}
+
 #[test]
 fn a_joint_mastered_anew_between_two_series_is_named() {
     let solution = solved(&halves(&seen(23), |_, q| q[2] += 3e-3));

@@ -17,7 +17,7 @@ use crate::urdf::Chain;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "The flange at given readings")]
 pub(super) struct AtArgs {
-    /// Joint vectors (CSV, columns named as the joints): pose and uncertainty of the flange relative to the plate (of several placements that of the first image, named in relative_to), by the corrected URDF with compensation.toml, go to at.csv. A constant displacement of the flange, which no series tells, is in no uncertainty there: that of the camera on it is in hand_camera.yaml
+    /// Joint vectors (CSV, columns named as the joints): pose and uncertainty of the flange relative to the plate (of several placements that of most images, named in relative_to), by the corrected URDF with compensation.toml, go to at.csv. A constant displacement of the flange, which no series tells, is in no uncertainty there: that of the camera on it is in hand_camera.yaml
     #[arg(long, value_name = "FILE", requires = "at_unit")]
     at: Option<PathBuf>,
     /// Unit of the revolute joints in that file
@@ -114,7 +114,7 @@ impl AtTable<'_> {
             path.display(),
             if *unit == Unit::Deg { "deg, m" } else { "rad, m" },
             still,
-            if among > 1 { format!(" (of {among} that of the first image on the robot)") } else { String::new() },
+            if among > 1 { format!(" (of {among} that of most images on the robot)") } else { String::new() },
             if entered_offsets(record)?.iter().any(|offset| *offset != 0.0) {
                 ", the readings those of the controller with the offsets of mastering.csv entered"
             } else {

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Vector3, Vector6};
 use super::bodies_record::first_instrument;
 use super::series_record::StopNoise;
 use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
-use crate::assess::{FlangeModel, Limits, usual_joint_sigma};
+use crate::assess::{FlangeModel, Limits, Standing, usual_joint_sigma};
 use crate::error::{Code, Error, Result};
 use crate::frames::{KnownRobot, TouchedMarker};
 use crate::geom::Pose;
@@ -19,7 +19,7 @@ use crate::model::plate_modes::MODES;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Layout, Names, PlateShape, State};
 use crate::problem::{MeasuredSeries, MeasuredStop, Shared};
-use crate::series::{CameraMount, Marker, Observation, Plate};
+use crate::series::{Marker, Observation, Plate};
 use crate::urdf::{Chain, RobotDescription};
 
 fn damaged(what: impl std::fmt::Display) -> Error {
@@ -181,7 +181,7 @@ pub struct FoundModel {
     pub robot: Robot,
     /// All columns, those of local errors among them.
     pub layout: Layout,
-    /// What stands still in the base frame for the first image on the robot, and its first column.
+    /// What stands still in the base frame for most images on the robot, and its first column.
     pub still: Option<(Pose, usize)>,
     /// Covariance of the columns of `layout`, m and rad, with the plates in the frames of their nominal markers, as `still` is.
     pub covariance: DMatrix<f64>,
@@ -303,9 +303,14 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     let at = |i: usize, j: usize| record.covariance_lower[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
     let used = || record.images.iter().filter(|i| i.is_used());
     let stop = |i: &ImageRecord| i.readings.clone().map(|readings| Posture { readings, approach: i.approach.clone() });
-    let still = used().find(|i| i.is_on_robot()).map(|i| match i.camera_mount {
-        CameraMount::Hand => (state.placements[i.placement], layout.placements[i.placement].start),
-        CameraMount::Fixed => (state.mountings[i.mounting], layout.mountings[i.mounting].start),
+    let name = |standing| match standing {
+        Standing::Placement(k) => record.placements[k].name.as_str(),
+        Standing::Mounting(k) => record.mountings[k].name.as_str(),
+    };
+    let standing = used().filter(|i| i.is_on_robot()).map(|i| Standing::of(i.camera_mount, i.mounting, i.placement));
+    let still = Standing::of_most(standing, name).map(|standing| match standing {
+        Standing::Placement(k) => (state.placements[k], layout.placements[k].start),
+        Standing::Mounting(k) => (state.mountings[k], layout.mountings[k].start),
     });
     let of_instrument = || first_instrument(&record.bodies).map(|(pose, k)| (pose, layout.instruments[k].start));
     let still = still.or_else(of_instrument);
