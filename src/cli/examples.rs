@@ -70,7 +70,7 @@ examples! {
     PLAN = [
         "robotcal plan --from reports/run1/solution.json --touch fixture.csv --touch-work 0.5,0.1,0.1 --count 12 --out touches",
         "robotcal plan --urdf robot.urdf --plate plate/plate.toml --count 30 --out run1",
-        "robotcal plan --urdf robot.urdf --from reports/run1/solution.json --count 10 --out run2",
+        "robotcal plan --from reports/run1/solution.json --count 10 --out run2",
     ];
     /// Of `plate`.
     PLATE = [
