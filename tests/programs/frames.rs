@@ -500,10 +500,6 @@ fn joints_beside_the_chain_that_moved_between_touches_are_named() {
     touches.postures.iter_mut().zip(&turns).for_each(|(posture, turn)| posture.readings.extend(turn));
     let moved = found(&touches, &joints, "told");
     assert_eq!((moved.quantities["joints_moved"], moved.quantities["joints_untold"]), (2.0, 0.0));
-    assert!(
-        ["tilt", "turn"].iter().all(|joint| moved.text.contains(joint) && untold.text.contains(joint)),
-        "{moved:?}"
-    );
 }
 
 /// What is written for controllers is read back by the readers of their programs, the URDF by that of robots.

@@ -13,6 +13,7 @@ use robotcal::geom::{Pose, log_so3};
 use robotcal::identify::{Options, RobotModel, identify, verify_series};
 use robotcal::model::inverse::{reading_limits, solve_from};
 use robotcal::model::robot::Robot;
+use robotcal::output::solution_json;
 use robotcal::plan::plate_design::{PlateRequest, design};
 use robotcal::simulate::truth::Truth;
 use robotcal::simulate::{WorldRequest, series as simulated};
@@ -21,7 +22,7 @@ use robotcal::urdf::Chain;
 use robotcal::{Code, Error};
 use tempfile::TempDir;
 
-use crate::robots::kr6_urdf;
+use crate::robots::{kr6_urdf, repo};
 use crate::said::assert_says;
 use crate::support::small::Dice;
 
@@ -133,7 +134,11 @@ fn hand_eye_transform_and_noise_are_found_without_a_robot() {
     // Between the poses of the stops the model in the controller errs in another way: the promise is of these alone.
     let report = String::from_utf8(files["report.html"].clone()).unwrap();
     let promise = report.split("<h2>Accuracy of the flange</h2>").nth(1).unwrap().split("<h2>").next().unwrap();
-    assert!(promise.contains("at the poses of the stops") && !promise.contains("region of the stops"), "{promise}");
+    let [record, of_robot] =
+        [files["solution.json"].clone(), fs::read(repo("reports/kr6_small/solution.json")).unwrap()]
+            .map(|bytes| solution_json::read(&bytes).unwrap());
+    assert_ne!(record.flange_holds(), of_robot.flange_holds());
+    assert!(promise.contains(record.flange_holds()) && !promise.contains(of_robot.flange_holds()), "{promise}");
     for part in ["urdf", "kinematics", "mdh", "mastering", "compensation"] {
         assert!(files.keys().all(|name| !name.contains(part)), "{part} of no robot");
     }

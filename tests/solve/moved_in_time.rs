@@ -124,7 +124,7 @@ fn a_camera_turned_once_is_not_called_loose() {
 fn what_is_loose_is_named_by_where_the_camera_is() {
     for (mount, held_by) in [(CameraMount::Hand, "camera mount "), (CameraMount::Fixed, "camera stand ")] {
         let mut series = seen(mount, 24, 5);
-        let turned = Pose::exp(&Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 3e-3));
+        let turned = Pose::exp(&Vector6::new(0.0, 0.0, 0.0, 3e-3, 0.0, 0.0));
         for k in [0, 1, 4, 6, 9, 10, 13, 15, 18, 20, 23] {
             change(&mut series, k..k + 1, |pose| turned * pose);
         }
@@ -135,7 +135,7 @@ fn what_is_loose_is_named_by_where_the_camera_is() {
         });
         let (loose, place) = loose.unwrap_or_else(|| panic!("{mount:?}: {:?}", solution.findings));
         assert!(loose.mount == mount && place.starts_with(held_by), "{place}: {loose:?}");
-        // A tenth: 24 images of a roll that scatters by some 0.1 mrad.
+        // A tenth: 24 images of a pitch that scatters by some 0.1 mrad.
         assert!((loose.angle_rad.abs() - 3e-3).abs() < 3e-4, "{loose:?}");
     }
 }
