@@ -5,15 +5,20 @@ use std::process::Command;
 
 use crate::robots::{kr6_and_positioner, positioner};
 use crate::said::assert_says;
-use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use robotcal::geom::{OrientedBox, Pose};
 use robotcal::identify::RobotModel;
 use robotcal::model::camera::{Camera, Lens};
+use robotcal::output::plan_start::from_solution;
+use robotcal::output::restore::{chain as chain_of, robot_description};
+use robotcal::output::solution_json::{self, ImageRecord, PlacedRecord, SeriesRecord, SolutionRecord};
 use robotcal::plan::candidates::CandidateOptions;
 use robotcal::plan::criterion::Criterion;
+use robotcal::plan::information::stop_information;
 use robotcal::plan::scene::{Capsule, Scene, SceneOptions};
-use robotcal::plan::setting::{Beside, Setting};
+use robotcal::plan::setting::{Beside, PlannedStop, Setting};
 use robotcal::plan::{Budget, Choice, Demand, Plan, PlanRequest, choose, forecast, plan};
+use robotcal::problem::Image;
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::urdf::{Chain, JointKind};
 use robotcal::{Code, ErrorKind};
@@ -405,6 +410,60 @@ fn further_poses_are_planned_from_a_result_with_its_noise() {
     let (code, _, error) = run(&[&base[..], &["--joint-noise-mrad", "0.5"]].concat());
     // Refused by the parser of the command line, which knows no codes.
     assert!(code == 2 && error.contains("--joint-noise-mrad") && error.contains("--from"), "{code}: {error}");
+}
+
+/// Images of every camera that shows the plate count, in the hand or not; those of another plate do not.
+#[test]
+fn images_of_all_cameras_that_show_the_plate_are_counted() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/kr6_small/solution.json");
+    let mut record = solution_json::read(&std::fs::read(path).unwrap()).unwrap();
+    record.placements.push(PlacedRecord { name: "carried".into(), ..record.placements[0].clone() });
+    record.mountings.push(record.mountings[0].clone());
+    record.cameras.push(record.cameras[0].clone());
+    for image in record.images.iter_mut().skip(12) {
+        (image.camera, image.camera_mount, image.placement, image.mounting) = (1, CameraMount::Fixed, 1, 1);
+    }
+    let start = |record: &SolutionRecord| {
+        let own = chain_of(record, &robot_description(record).unwrap(), &record.robot.base, &record.robot.tip).unwrap();
+        from_solution(record, own, RobotModel::Rigid).unwrap()
+    };
+    let (mut setting, stops) = start(&record);
+    assert_eq!((stops.len(), setting.beside.cameras.len(), setting.beside.placements.len()), (24, 1, 1));
+    let new = [("new".to_owned(), setting.placements[0].1)];
+    let stops = setting.with_further_placements(new.to_vec(), stops);
+    let of_second = stops[12..].iter().flat_map(|s| &s.images);
+    assert!(of_second.clone().all(|i| (i.camera, i.mounting, i.placement, i.mount) == (1, 1, 2, CameraMount::Fixed)));
+    let planned = setting.adjustment();
+    assert_eq!(planned.state.placements[2].translation, setting.beside.placements[0].1.translation);
+    // Every joint is better known by both cameras than by either.
+    let twists = planned.problem.layout.twists.clone();
+    let known = |stops: &[PlannedStop]| {
+        let all = stops.iter().filter_map(|stop| stop_information(&planned, stop));
+        let all = all.fold(DMatrix::zeros(twists.end, twists.end), |sum, one| sum + one.view((0, 0), sum.shape()));
+        twists.clone().map(|k| all[(k, k)]).collect::<Vec<f64>>()
+    };
+    let [first, second, both] = [&stops[..12], &stops[12..], &stops[..]].map(known);
+    assert!((0..both.len()).all(|k| both[k] >= first[k].max(second[k])) && both.iter().sum::<f64>() > 0.0);
+    // Two cameras at one stop see through the same joint noise: of one place they say less of the robot than at two stops.
+    let mut together = record.clone();
+    let other = SeriesRecord { name: "second".into(), ..together.series[0].clone() };
+    together.series.push(other);
+    together.series.iter_mut().for_each(|s| s.run = Some("run".into()));
+    together.images.truncate(12);
+    together.images.iter_mut().enumerate().for_each(|(k, image)| image.row = Some(k));
+    let second = |i: &ImageRecord| ImageRecord { camera: 1, series: "second".into(), ..i.clone() };
+    together.images.extend(together.images.clone().iter().map(second));
+    let (_, at_once) = start(&together);
+    assert_eq!(at_once.iter().map(|s| s.images.len()).collect::<Vec<_>>(), vec![2; 12]);
+    let apart = |stop: &PlannedStop| {
+        let of = |image: &Image| PlannedStop { posture: stop.posture.clone(), images: vec![image.clone()] };
+        stop.images.iter().map(of).collect::<Vec<_>>()
+    };
+    let apart: Vec<PlannedStop> = at_once.iter().flat_map(apart).collect();
+    assert!(known(&at_once).iter().sum::<f64>() < known(&apart).iter().sum::<f64>());
+    record.plates.push(record.plates[0].clone());
+    record.images.iter_mut().skip(12).for_each(|i| i.plate = 1);
+    assert_eq!(start(&record).1.len(), 12);
 }
 
 /// The first numbers of a line in braces or brackets.

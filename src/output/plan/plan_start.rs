@@ -231,67 +231,11 @@ fn typical_sigma(stops: &[PlannedStop]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::DMatrix;
-
     use super::from_solution;
     use crate::identify::RobotModel;
     use crate::output::restore::{chain, robot_description};
-    use crate::output::solution_json::{ImageRecord, SeriesRecord, SolutionRecord};
-    use crate::plan::information::stop_information;
-    use crate::plan::setting::PlannedStop;
-    use crate::problem::Image;
+    use crate::output::solution_json::SolutionRecord;
     use crate::series::CameraMount;
-
-    /// Images of every camera that shows the plate count, in the hand or not; those of another plate do not.
-    #[test]
-    fn images_of_all_cameras_that_show_the_plate_are_counted() {
-        let mut record = SolutionRecord::with_both_mounts();
-        record.cameras.push(record.cameras[0].clone());
-        record.images.iter_mut().skip(12).for_each(|i| i.camera = 1);
-        let start = |record: &SolutionRecord| {
-            let own =
-                chain(record, &robot_description(record).unwrap(), &record.robot.base, &record.robot.tip).unwrap();
-            from_solution(record, own, RobotModel::Rigid).unwrap()
-        };
-        let (mut setting, stops) = start(&record);
-        assert_eq!((stops.len(), setting.beside.cameras.len(), setting.beside.placements.len()), (24, 1, 1));
-        let new = [("new".to_owned(), setting.placements[0].1)];
-        let stops = setting.with_further_placements(new.to_vec(), stops);
-        let of_second = stops[12..].iter().flat_map(|s| &s.images);
-        assert!(
-            of_second.clone().all(|i| (i.camera, i.mounting, i.placement, i.mount) == (1, 1, 2, CameraMount::Fixed))
-        );
-        let planned = setting.adjustment();
-        assert_eq!(planned.state.placements[2].translation, setting.beside.placements[0].1.translation);
-        // Every joint is better known by both cameras than by either.
-        let twists = planned.problem.layout.twists.clone();
-        let known = |stops: &[PlannedStop]| {
-            let all: DMatrix<f64> = stops.iter().filter_map(|stop| stop_information(&planned, stop)).sum();
-            twists.clone().map(|k| all[(k, k)]).collect::<Vec<f64>>()
-        };
-        let [first, second, both] = [&stops[..12], &stops[12..], &stops[..]].map(known);
-        assert!((0..both.len()).all(|k| both[k] >= first[k].max(second[k])) && both.iter().sum::<f64>() > 0.0);
-        // Two cameras at one stop see through the same joint noise: of one place they say less of the robot than at two stops.
-        let mut together = record.clone();
-        let other = SeriesRecord { name: "second".into(), ..together.series[0].clone() };
-        together.series.push(other);
-        together.series.iter_mut().for_each(|s| s.run = Some("run".into()));
-        together.images.truncate(12);
-        together.images.iter_mut().enumerate().for_each(|(k, image)| image.row = Some(k));
-        let second = |i: &ImageRecord| ImageRecord { camera: 1, series: "second".into(), ..i.clone() };
-        together.images.extend(together.images.clone().iter().map(second));
-        let (_, at_once) = start(&together);
-        assert_eq!(at_once.iter().map(|s| s.images.len()).collect::<Vec<_>>(), vec![2; 12]);
-        let apart = |stop: &PlannedStop| {
-            let of = |image: &Image| PlannedStop { posture: stop.posture.clone(), images: vec![image.clone()] };
-            stop.images.iter().map(of).collect::<Vec<_>>()
-        };
-        let apart: Vec<PlannedStop> = at_once.iter().flat_map(apart).collect();
-        assert!(known(&at_once).iter().sum::<f64>() < known(&apart).iter().sum::<f64>());
-        record.plates.push(record.plates[0].clone());
-        record.images.iter_mut().skip(12).for_each(|i| i.plate = 1);
-        assert_eq!(start(&record).1.len(), 12);
-    }
 
     #[test]
     fn further_images_are_of_plates_that_the_camera_can_see() {
