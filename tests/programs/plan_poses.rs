@@ -439,7 +439,8 @@ fn images_of_all_cameras_that_show_the_plate_are_counted() {
     let twists = planned.problem.layout.twists.clone();
     let known = |stops: &[PlannedStop]| {
         let all = stops.iter().filter_map(|stop| stop_information(&planned, stop));
-        let all = all.fold(DMatrix::zeros(twists.end, twists.end), |sum, one| sum + one.view((0, 0), sum.shape()));
+        let n = twists.end;
+        let all = all.fold(DMatrix::<f64>::zeros(n, n), |sum, one| sum + one.view((0, 0), (n, n)));
         twists.clone().map(|k| all[(k, k)]).collect::<Vec<f64>>()
     };
     let [first, second, both] = [&stops[..12], &stops[12..], &stops[..]].map(known);
