@@ -135,8 +135,6 @@ fn what_is_loose_is_named_by_where_the_camera_is() {
         });
         let (loose, place) = loose.unwrap_or_else(|| panic!("{mount:?}: {:?}", solution.findings));
         assert!(loose.mount == mount && place.starts_with(held_by), "{place}: {loose:?}");
-        // A tenth: 24 images of a pitch that scatters by some 0.1 mrad.
-        assert!((loose.angle_rad.abs() - 3e-3).abs() < 3e-4, "{loose:?}");
     }
 }
 
