@@ -3,17 +3,17 @@
 use nalgebra::Matrix6;
 
 use crate::geom::Pose;
-use crate::problem::{Image, ImageTerms, State, Weighting, linearise};
+use crate::problem::{Image, State, Weighting, linearise_pose};
 
 /// Squared Newton decrement below which a pose is at its end.
 const AT_END: f64 = 1e-8;
 /// Most steps from near the end.
 const NEAR_STEPS: usize = 8;
 
-/// Refines `camera_from_plate` of one image with everything else held; returns pose and final terms, `None` where it diverges.
-pub fn resect(image: &Image, state: &State, start: &Pose, weighting: &Weighting) -> Option<(Pose, ImageTerms)> {
+/// Refines `camera_from_plate` of one image with everything else held; returns the pose and its robust cost, `None` where it diverges.
+pub fn resect(image: &Image, state: &State, start: &Pose, weighting: &Weighting) -> Option<(Pose, f64)> {
     let mut pose = *start;
-    let mut terms = linearise(image, state, &pose, weighting)?;
+    let mut terms = linearise_pose(image, state, &pose, weighting)?;
     let mut lambda = 1e-4;
     for _ in 0..60 {
         let mut a: Matrix6<f64> = terms.pp;
@@ -23,7 +23,7 @@ pub fn resect(image: &Image, state: &State, start: &Pose, weighting: &Weighting)
         let step = a.cholesky()?.solve(&terms.bp);
         let decrement = step.dot(&terms.bp);
         let next = pose.perturbed(&step);
-        match linearise(image, state, &next, weighting) {
+        match linearise_pose(image, state, &next, weighting) {
             Some(better) if better.cost <= terms.cost => {
                 (pose, terms) = (next, better);
                 lambda = (lambda * 0.1).max(1e-12);
@@ -38,7 +38,7 @@ pub fn resect(image: &Image, state: &State, start: &Pose, weighting: &Weighting)
             break;
         }
     }
-    Some((pose, terms))
+    Some((pose, terms.cost))
 }
 
 /// As [`resect`], from near the end: Gauss-Newton, whose squared decrement `d` falls to some `d^2 / d_before` with the next step, so that the last
@@ -46,7 +46,7 @@ pub fn resect(image: &Image, state: &State, start: &Pose, weighting: &Weighting)
 pub fn resect_near(image: &Image, state: &State, start: &Pose, weighting: &Weighting) -> Option<Pose> {
     let (mut pose, mut before) = (*start, None::<f64>);
     for _ in 0..NEAR_STEPS {
-        let terms = linearise(image, state, &pose, weighting)?;
+        let terms = linearise_pose(image, state, &pose, weighting)?;
         let step = terms.pp.cholesky()?.solve(&terms.bp);
         let decrement = step.dot(&terms.bp);
         if before.is_some_and(|before| decrement > before) {

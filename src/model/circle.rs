@@ -9,7 +9,7 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
-use super::camera::{Camera, MAX_PARAMETERS, Projections, weighted_sum};
+use super::camera::{Camera, MAX_PARAMETERS, Projections, Touched, weighted_sum};
 use crate::geom::{Pose, skew};
 
 /// Where the contour is sampled.
@@ -232,7 +232,7 @@ fn field_columns(
     camera: &Camera,
     samples: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>,
 ) -> Vec<(usize, Matrix2<f64>)> {
-    let mut columns: Vec<(usize, Matrix2<f64>)> = Vec::new();
+    let mut columns: Vec<(usize, Matrix2<f64>)> = Vec::with_capacity(Touched::POINTS);
     for (touched, g) in samples.filter_map(|(h, g)| Some((camera.touched(&h)?, g))) {
         for (k, b) in touched.points() {
             match columns.binary_search_by_key(&k, |c| c.0) {

@@ -20,9 +20,33 @@ const MODE: usize = POSE + P;
 const RESIDUAL: usize = MODE + MODES;
 const FORMULA: usize = RESIDUAL + 1;
 
-/// Control points of the displacement field that an observation touches, ascending, by their places among those that the image touches, with the
-/// derivative by their u and v.
-type Field = Vec<(usize, Matrix2<f64>)>;
+/// Control points of the displacement field that observations touch, of each ascending, by their places among those that the image touches, with the
+/// derivative by their u and v: of one observation after the other.
+#[derive(Debug, Clone, Default)]
+struct Field {
+    points: Vec<(usize, Matrix2<f64>)>,
+    /// Where those of each observation end; empty for a lens without a field.
+    ends: Vec<usize>,
+}
+
+impl Field {
+    /// Those of an observation.
+    fn of(&self, observation: usize) -> &[(usize, Matrix2<f64>)] {
+        let Some(&end) = self.ends.get(observation) else { return &[] };
+        let start = observation.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.points[start..end]
+    }
+
+    /// From control points by their places in the whole field to those among the touched ones, which are returned, ascending.
+    fn number(&mut self) -> Vec<usize> {
+        let mut place = vec![None; self.points.iter().map(|(k, _)| k + 1).max().unwrap_or_default()];
+        self.points.iter().for_each(|(k, _)| place[*k] = Some(0));
+        let touched: Vec<usize> = (0..place.len()).filter(|&k| place[k].is_some()).collect();
+        touched.iter().enumerate().for_each(|(at, &k)| place[k] = Some(at));
+        self.points.iter_mut().for_each(|(k, _)| *k = place[*k].unwrap_or_default());
+        touched
+    }
+}
 
 /// Intrinsic unknowns of one image before its displacement field: camera parameters (padded), then plate modes.
 ///
@@ -36,8 +60,7 @@ pub struct Equations {
     columns: DMatrix<f64>,
     /// Marker of every observation.
     pub markers: Vec<usize>,
-    /// Of every observation; empty for a lens without a field.
-    field: Vec<Field>,
+    field: Field,
     /// Control points of the field that any of them touches, ascending.
     pub touched: Vec<usize>,
 }
@@ -55,7 +78,8 @@ pub(super) struct Collector {
     columns: Vec<f64>,
     rows: usize,
     markers: Vec<usize>,
-    field: Vec<Field>,
+    /// By places in the whole field.
+    field: Field,
 }
 
 impl Collector {
@@ -63,7 +87,7 @@ impl Collector {
     pub fn new(most: usize, formula: usize) -> Self {
         let rows = FORMULA + formula;
         let columns = Vec::with_capacity(2 * most * rows);
-        Self { columns, rows, markers: Vec::with_capacity(most), field: Vec::new() }
+        Self { columns, rows, markers: Vec::with_capacity(most), field: Field::default() }
     }
 
     /// Adds an observation with its derivative by the modes of the plate, its residual and the square root `F'` of its weight.
@@ -85,17 +109,14 @@ impl Collector {
         }
         self.markers.push(marker);
         if !p.d_field.is_empty() {
-            self.field.push(p.d_field.iter().map(|(k, d)| (*k, root * d)).collect());
+            self.field.points.extend(p.d_field.iter().map(|(k, d)| (*k, root * d)));
+            self.field.ends.push(self.field.points.len());
         }
     }
 
     pub fn finish(self) -> Equations {
         let Self { columns, rows, markers, mut field } = self;
-        let mut touched: Vec<usize> = field.iter().flatten().map(|(k, _)| *k).collect();
-        touched.sort_unstable();
-        touched.dedup();
-        let place = |k: usize| touched.partition_point(|t| *t < k);
-        field.iter_mut().flatten().for_each(|(k, _)| *k = place(*k));
+        let touched = field.number();
         let columns = DMatrix::from_vec(rows, 2 * markers.len(), columns);
         Equations { columns, markers, field, touched }
     }
@@ -118,10 +139,7 @@ impl Equations {
     pub fn sights(&self) -> impl Iterator<Item = Sight<'_>> {
         let rows = self.columns.nrows();
         let pairs = self.columns.as_slice().chunks_exact(2 * rows).map(move |pair| pair.split_at(rows));
-        pairs.enumerate().map(|(k, (first, second))| Sight {
-            equations: [first, second],
-            field: self.field.get(k).map_or(&[], Vec::as_slice),
-        })
+        pairs.enumerate().map(|(k, (first, second))| Sight { equations: [first, second], field: self.field.of(k) })
     }
 
     /// Derivatives by unknowns that move the pose as `pose_by` says (unknowns x 6), one column an equation.
@@ -163,13 +181,11 @@ impl Equations {
     pub(super) fn marker_terms(&self) -> Vec<MarkerTerms> {
         let mut all: Vec<MarkerTerms> = Vec::with_capacity(self.markers.chunk_by(|a, b| a == b).count());
         for (&marker, sight) in self.markers.iter().zip(self.sights()) {
-            let by_marker = sight.by_marker();
-            let (mm, bm) = (by_marker * by_marker.transpose(), by_marker * sight.residual());
             match all.last_mut().filter(|last| last.marker == marker) {
-                Some(last) => last.add(&mm, &bm),
+                Some(last) => last.add(&sight),
                 None => {
                     let mut own = MarkerTerms { marker, upper: [0.0; 6], bm: Vector3::zeros() };
-                    own.add(&mm, &bm);
+                    own.add(&sight);
                     all.push(own);
                 }
             }
@@ -293,10 +309,11 @@ impl MarkerTerms {
         Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
     }
 
-    fn add(&mut self, mm: &Matrix3<f64>, bm: &Vector3<f64>) {
+    fn add(&mut self, sight: &Sight) {
         let upper = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)];
-        self.upper.iter_mut().zip(upper).for_each(|(own, at)| *own += mm[at]);
-        self.bm += bm;
+        let ([a, b], r) = (sight.row_range(POSE..POSE + 3), sight.residual());
+        self.upper.iter_mut().zip(upper).for_each(|(own, (i, k))| *own += a[i] * a[k] + b[i] * b[k]);
+        self.bm.iter_mut().enumerate().for_each(|(k, own)| *own += a[k] * r[0] + b[k] * r[1]);
     }
 }
 

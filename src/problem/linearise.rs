@@ -4,7 +4,7 @@
 //! pose (p, 6), intrinsics (e, camera parameters then plate modes) and markers (m, 3 each); the robot enters afterwards by
 //! `dp = G dtheta + L dl`, `l` what is latent ([`State::chained`]).
 
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Matrix6xX, Vector2, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Matrix6x2, Matrix6xX, SMatrix, Vector2, Vector6};
 
 use super::equations::{Collector, E, Equations, MarkerTerms};
 use super::state::{Displaced, seen_centre};
@@ -12,6 +12,7 @@ use super::{Image, Layout, MarkerObservation, Problem, State, TakenFrom, Tie};
 use crate::geom::{Pose, adjoint};
 use crate::linalg::wide;
 use crate::model::circle::Prediction;
+use crate::model::plate_modes::MODES;
 use crate::model::robot::{Kinematics, LinearOrigins};
 
 /// One residual with what the robust weighting made of it.
@@ -124,6 +125,55 @@ pub fn equations(image: &Image, state: &State, pose: &Pose, weighting: &Weightin
     )
 }
 
+/// Normal equations of the pose of one image, all else held.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PoseTerms {
+    /// As [`ImageTerms::cost`].
+    pub cost: f64,
+    /// Information.
+    pub pp: Matrix6<f64>,
+    /// Right-hand side.
+    pub bp: Vector6<f64>,
+}
+
+impl PoseTerms {
+    /// Adds an observation with its derivative by the pose, its residual and the square root of its weight.
+    #[inline(always)]
+    fn add(&mut self, d_pose: &Matrix6x2<f64>, duv: &Vector2<f64>, root: &Matrix2<f64>) {
+        let (u, v) = d_pose.as_slice().split_at(6);
+        for (by_u, by_v) in [(root[(0, 0)], root[(0, 1)]), (0.0, root[(1, 1)])] {
+            let equation: [f64; 6] = std::array::from_fn(|k| by_u * u[k] + by_v * v[k]);
+            let residual = by_u * duv[0] + by_v * duv[1];
+            for (sums, of) in self.pp.as_mut_slice().as_chunks_mut::<6>().0.iter_mut().zip(equation) {
+                sums.iter_mut().zip(equation).for_each(|(sum, by)| *sum += by * of);
+            }
+            self.bp.iter_mut().zip(equation).for_each(|(sum, by)| *sum += by * residual);
+        }
+    }
+}
+
+/// As [`linearise`], of the pose alone.
+pub fn linearise_pose(image: &Image, state: &State, pose: &Pose, weighting: &Weighting) -> Option<PoseTerms> {
+    wide(
+        #[inline(always)]
+        || {
+            let mut terms = PoseTerms::default();
+            each_seen(
+                image,
+                state,
+                pose,
+                weighting,
+                #[inline(always)]
+                |p, seen| {
+                    terms.cost += seen.cost;
+                    terms.add(&p.d_pose, &seen.residual.duv, &seen.root);
+                },
+            )?;
+            Some(terms)
+        },
+    )
+}
+
 /// `tell` hears of every observation in use, with its robust cost.
 #[inline(always)]
 fn whitened(
@@ -133,11 +183,46 @@ fn whitened(
     weighting: &Weighting,
     mut tell: impl FnMut(f64, Residual),
 ) -> Option<Equations> {
+    let most = image.observations.len().div_ceil(weighting.every);
+    let mut equations = Collector::new(most, state.cameras[image.camera].parametric());
+    each_seen(
+        image,
+        state,
+        pose,
+        weighting,
+        #[inline(always)]
+        |p, seen| {
+            equations.add(seen.marker, p, &seen.by_modes, &seen.residual.duv, &seen.root);
+            tell(seen.cost, seen.residual);
+        },
+    )?;
+    Some(equations.finish())
+}
+
+/// An observation in use.
+struct Seen {
+    marker: usize,
+    /// Derivative of its prediction by the modes of the plate.
+    by_modes: SMatrix<f64, MODES, 2>,
+    residual: Residual,
+    /// Robust cost.
+    cost: f64,
+    /// Square root `F'` of its weight, the robust one included.
+    root: Matrix2<f64>,
+}
+
+/// Tells of every observation in use with its prediction; `None` where one is behind the camera.
+#[inline(always)]
+fn each_seen(
+    image: &Image,
+    state: &State,
+    pose: &Pose,
+    weighting: &Weighting,
+    mut tell: impl FnMut(&Prediction, &Seen),
+) -> Option<()> {
     let (plate, camera) = (&state.plates[image.plate], &state.cameras[image.camera]);
     let precision = 1.0 / weighting.pixel_factor;
     let used = image.observations.iter().enumerate().filter(|(_, o)| o.rejected.is_none());
-    let most = image.observations.len().div_ceil(weighting.every);
-    let mut equations = Collector::new(most, camera.parametric());
     let mut stated = (Matrix2::zeros(), Matrix2::zeros());
     for (observation, o) in used.step_by(weighting.every) {
         let (p, by_modes) = o.predict(camera, pose, plate)?;
@@ -149,11 +234,11 @@ fn whitened(
         let root = stated.1;
         let normalised = (root * duv).norm();
         let (cost, weight) = weighting.huber(normalised);
-        let weighted = if weight < 1.0 { root * weight.sqrt() } else { root };
-        equations.add(o.marker, &p, &by_modes, &duv, &weighted);
-        tell(cost, Residual { observation, duv, normalised, weight });
+        let root = if weight < 1.0 { root * weight.sqrt() } else { root };
+        let residual = Residual { observation, duv, normalised, weight };
+        tell(&p, &Seen { marker: o.marker, by_modes, residual, cost, root });
     }
-    Some(equations.finish())
+    Some(())
 }
 
 /// `F'` of a positive semidefinite matrix `F F'`, upper triangular.
@@ -185,23 +270,22 @@ impl ImageTerms {
 
     fn add_field(&mut self, equations: &Equations) {
         for sight in equations.sights() {
-            for (k, d) in sight.by_field() {
+            let (by_pose, by_intrinsics) = (sight.by_pose(), sight.by_intrinsics());
+            for (at, (k, d)) in sight.by_field().iter().enumerate() {
                 let (column, dt) = (E + 2 * k, d.transpose());
                 let mut pe = self.pe.fixed_columns_mut::<2>(column);
-                pe += sight.by_pose() * d;
+                pe += by_pose * d;
                 let mut be = self.be.fixed_rows_mut::<2>(column);
                 be += dt * sight.residual();
-                let with_e = sight.by_intrinsics() * d;
-                let mut row = self.ee.fixed_view_mut::<2, E>(column, 0);
-                row += with_e.transpose();
-                let mut transposed = self.ee.fixed_view_mut::<E, 2>(0, column);
-                transposed += with_e;
-                for (other, e) in sight.by_field() {
-                    let mut block = self.ee.fixed_view_mut::<2, 2>(column, E + 2 * other);
-                    block += dt * e;
+                let mut with_e = self.ee.fixed_view_mut::<E, 2>(0, column);
+                with_e += by_intrinsics * d;
+                for (other, e) in &sight.by_field()[..=at] {
+                    let mut block = self.ee.fixed_view_mut::<2, 2>(E + 2 * other, column);
+                    block += e.transpose() * d;
                 }
             }
         }
+        self.ee.fill_lower_triangle_with_upper_triangle();
     }
 }
 

@@ -46,7 +46,7 @@ pub use image::Image;
 pub use layout::{Column, Layout, Names, OriginPrior};
 pub use length::{Length, LengthEnds, MeasuredLength};
 pub use linearise::{
-    Chained, ImageTerms, Residual, Weighting, equations, linearise, linearise_with_equations, predict,
+    Chained, ImageTerms, Residual, Weighting, equations, linearise, linearise_pose, linearise_with_equations, predict,
 };
 pub use measured::{Mark, MarkerObservation};
 pub use measured_series::{

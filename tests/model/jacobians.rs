@@ -12,7 +12,7 @@ use robotcal::model::circle;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::plate_modes::MODES;
 use robotcal::problem::{
-    Adjustment, E, Image, Problem, State, TakenFrom, Tie, Weighting, equations, linearise, predict,
+    Adjustment, E, Image, Problem, State, TakenFrom, Tie, Weighting, equations, linearise, linearise_pose, predict,
 };
 use robotcal::series::CameraMount;
 use robotcal::urdf::JointKind;
@@ -445,6 +445,10 @@ fn check_image(problem: &Problem, state: &State, image: &Image, pose: &Pose) {
     assert_same("ee", &(se * library_ee * se), &(se * ee * se), CIRCLE);
     assert_same("bp", &(sp * library.bp), &(sp * bp), 10.0 * CIRCLE);
     assert_same("be", &(se * library.be.fixed_rows::<E>(0)), &(se * be), 10.0 * CIRCLE);
+    let of_pose = linearise_pose(image, state, pose, &weighting).unwrap();
+    assert_eq!(of_pose.cost, library.cost);
+    assert_same("pp by itself", &(sp * of_pose.pp * sp), &(sp * pp * sp), CIRCLE);
+    assert_same("bp by itself", &(sp * of_pose.bp), &(sp * bp), 10.0 * CIRCLE);
     let unused = (0..E).filter(|k| ee[(*k, *k)] == 0.0);
     assert!(unused.clone().all(|k| library_ee[(k, k)] == 0.0), "padding is not empty");
 }

@@ -215,7 +215,7 @@ fn start_poses(
         behind += usize::from(planar.from_behind);
         let weighting = Weighting::of(problem, image);
         let tries = [planar, planar.flipped()].map(|p| resect(image, state, &p.camera_from_plate, &weighting));
-        let best = tries.into_iter().flatten().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        let best = tries.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
         ties[i] = Tie::Free(best.map_or(planar.camera_from_plate, |(pose, _)| pose));
     }
     state.ties = ties;

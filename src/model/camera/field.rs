@@ -93,9 +93,12 @@ impl Lattice {
 }
 
 impl Touched {
+    /// Number of control points that a point touches.
+    pub const POINTS: usize = TOUCHED * TOUCHED;
+
     /// Indices of the control points with the values of their basis functions.
     pub fn points(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        (0..TOUCHED * TOUCHED).map(|n| {
+        (0..Self::POINTS).map(|n| {
             let (i, k) = (n % TOUCHED, n / TOUCHED);
             (self.first + k * self.across + i, self.u[i] * self.v[k])
         })

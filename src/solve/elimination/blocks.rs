@@ -146,10 +146,12 @@ impl<'a> PoseRows<'a> {
         let mut upper = a.view_mut((0, 0), (theta, dense));
         upper += product(&self.chain.transpose(), &self.coupling);
         for own in self.images.clone().map(|k| self.linear.image(k)) {
-            let (columns, terms) = (own.columns(), own.terms);
-            let used = || columns.iter().enumerate().filter_map(|(e, c)| c.map(|c| (e, c)));
-            for (e, c) in used() {
-                used().filter(|(_, d)| *d <= c).for_each(|(f, d)| a[(d, c)] += terms.ee[(f, e)]);
+            let columns = own.columns().into_iter().enumerate();
+            let mut used: Vec<(usize, usize)> = columns.filter_map(|(e, c)| Some((c?, e))).collect();
+            used.sort_unstable();
+            for (at, &(c, e)) in used.iter().enumerate() {
+                let (mut into, of) = (a.column_mut(c), own.terms.ee.column(e));
+                used[..=at].iter().for_each(|&(d, f)| into[d] += of[f]);
             }
         }
     }
