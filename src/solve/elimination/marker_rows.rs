@@ -70,10 +70,12 @@ impl<'a> Ordered<'a> {
         let ImageRows { plate, equations, pose, intrinsics } = image;
         let row_of = |e: usize| Some((equations.intrinsic_row(e)?, intrinsics[e]?));
         let runs = runs(equations.pose_rows().zip(*pose..).chain((0..E).filter_map(row_of)));
-        let numbered = equations.markers.iter().zip(equations.sights());
-        let mut sights: Vec<_> = numbered.filter_map(|(&m, sight)| Some((seen.number[*plate][m]?, sight))).collect();
-        sights.sort_by_key(|(at, _)| *at);
-        Self { image, runs, sights }
+        let number = &seen.number[*plate];
+        let all: Vec<Sight> = equations.sights().collect();
+        let numbered = equations.markers.iter().enumerate();
+        let mut order: Vec<(usize, usize)> = numbered.filter_map(|(k, &m)| Some((number[m]?, k))).collect();
+        order.sort_unstable();
+        Self { image, runs, sights: order.into_iter().map(|(at, k)| (at, all[k])).collect() }
     }
 
     /// Its observations of some markers.
@@ -257,11 +259,12 @@ impl MarkerBlock {
         for of in &self.runs {
             for column in of.into.max(own.start)..(of.into + of.length).min(own.end) {
                 let sums = &mut into[(column - own.start) * rows..][..rows];
-                let gram = gram.column(of.from + column - of.into - first);
+                let height = gram.nrows();
+                let gram = &gram.as_slice()[(of.from + column - of.into - first) * height..][..height];
                 for Run { from, into, length } in self.runs.iter().take_while(|run| run.into <= column) {
                     let length = (*length).min(column + 1 - into);
                     let sums = sums[*into..][..length].iter_mut();
-                    sums.zip(gram.rows(*from, length).iter()).for_each(|(sum, value)| *sum += value);
+                    sums.zip(&gram[*from..][..length]).for_each(|(sum, value)| *sum += value);
                 }
             }
         }

@@ -15,6 +15,34 @@ use crate::solve::linear::LinearProblem;
 /// Unknowns that are latent at the stop of an image, and how each moves its pose.
 type ByLatents = Vec<(usize, Vector6<f64>)>;
 
+/// The same, row by row of the pose.
+#[derive(Debug, Clone)]
+struct LatentRows {
+    places: Vec<usize>,
+    /// So many a row as there are places.
+    rows: Vec<f64>,
+}
+
+impl LatentRows {
+    fn of(latents: &ByLatents) -> Self {
+        let rows = (0..6).flat_map(|row| latents.iter().map(move |(_, l)| l[row])).collect();
+        Self { places: latents.iter().map(|(place, _)| *place).collect(), rows }
+    }
+
+    /// Adds what is latent of a column of `T' y`, of which those are the rows of its pose.
+    #[inline(always)]
+    fn add_to(&self, into: &mut [f64], y: &[f64; 6]) {
+        let (Some(&first), n) = (self.places.first(), self.places.len()) else { return };
+        let rows: [&[f64]; 6] = std::array::from_fn(|row| &self.rows[row * n..(row + 1) * n]);
+        if self.places[n - 1] - first + 1 == n {
+            return add_combination(&mut into[first..first + n], rows, *y);
+        }
+        for (k, &place) in self.places.iter().enumerate() {
+            add_combination(&mut into[place..=place], rows.map(|row| &row[k..=k]), *y);
+        }
+    }
+}
+
 /// `T`, rows of the space x unknowns: the dense columns, then what is latent at the stops.
 #[derive(Debug, Clone)]
 pub struct PoseSpace {
@@ -23,6 +51,7 @@ pub struct PoseSpace {
     /// Of the poses by these, 6 images x columns.
     by_columns: DMatrix<f64>,
     by_latents: Vec<ByLatents>,
+    latent_rows: Vec<LatentRows>,
     /// The dense columns that act directly.
     direct: Range<usize>,
     unknowns: usize,
@@ -44,14 +73,16 @@ impl PoseSpace {
             let moves = own.chain.d_latent.fixed_rows::<6>(0);
             by_latents.push(places.zip(moves.column_iter().map(|l| l.into_owned())).collect());
         }
-        Self { columns, by_columns, by_latents, direct: layout.theta_len()..layout.len(), unknowns }
+        let latent_rows = by_latents.iter().map(LatentRows::of).collect();
+        Self { columns, by_columns, by_latents, latent_rows, direct: layout.theta_len()..layout.len(), unknowns }
     }
 
     /// The dense columns themselves, where nothing is latent: they are fewer than the rows of the poses.
     pub fn of_unknowns(layout: &Layout) -> Self {
         let (theta, unknowns) = (layout.theta_len(), layout.len());
         let (columns, by_columns) = ((0..theta).collect(), DMatrix::identity(theta, theta));
-        Self { columns, by_columns, by_latents: Vec::new(), direct: theta..unknowns, unknowns }
+        let (by_latents, latent_rows) = (Vec::new(), Vec::new());
+        Self { columns, by_columns, by_latents, latent_rows, direct: theta..unknowns, unknowns }
     }
 
     /// Number of its rows.
@@ -107,10 +138,13 @@ impl PoseSpace {
     fn add_without_columns(&self, y: DVectorView<f64>, into: &mut [f64]) {
         let direct = into[self.direct.clone()].iter_mut().zip(&y.as_slice()[self.poses()..]);
         direct.for_each(|(into, y)| *into += y);
-        for (k, latents) in self.by_latents.iter().enumerate() {
-            let pose = y.fixed_rows::<6>(6 * k);
-            latents.iter().for_each(|(place, l)| into[*place] += l.dot(&pose));
-        }
+        wide(
+            #[inline(always)]
+            || {
+                let poses = y.as_slice().as_chunks::<6>().0;
+                self.latent_rows.iter().zip(poses).for_each(|(latents, y)| latents.add_to(into, y));
+            },
+        );
     }
 
     /// Adds to the first columns of `T' y` what those that move poses have in it.
@@ -130,8 +164,12 @@ impl PoseSpace {
         a.as_mut_slice().par_chunks_mut(COLUMNS_A_BLOCK * rows).enumerate().for_each(|(block, columns)| {
             let mut own = vec![0.0; rows];
             for (c, column) in (block * COLUMNS_A_BLOCK..).zip(columns.chunks_exact_mut(rows)) {
+                let half = half.column(c);
+                if half.iter().all(|x| *x == 0.0) {
+                    continue;
+                }
                 own.fill(0.0);
-                self.add_without_columns(half.column(c), &mut own);
+                self.add_without_columns(half, &mut own);
                 if c < dense {
                     self.columns.iter().zip(of_columns.column(c).iter()).for_each(|(&row, sum)| own[row] += sum);
                 }
