@@ -14,7 +14,7 @@ use crate::fit::Fit;
 use crate::linalg::symmetric_eigen;
 use crate::model::camera::Lens;
 use crate::problem::{Adjustment, Equations, PlateShape, Step};
-use crate::solve::{LinearImage, Response, Singular, in_frame};
+use crate::solve::{LinearImage, Response, Singular};
 
 /// Highest degree of a polynomial.
 const HIGHEST: usize = 5;
@@ -148,7 +148,7 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
     }
     let groups = groups(fit);
     let response = response(fit, &groups)?;
-    let framed = in_frame(linear, &fit.covariance).ok();
+    let framed = fit.in_frame().ok();
     let stated = framed.as_ref().map(|framed| framed.dense(fit.problem.layout.len()));
     let effects = Effects::of(fit, framed.as_ref(), stated.as_ref().unwrap_or(&fit.covariance.reduced), limits);
     let (n, squares) = (response.equations as f64, response.squares);

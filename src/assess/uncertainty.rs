@@ -10,7 +10,7 @@ use crate::assess::{
 use crate::error::Result;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Noise};
-use crate::solve::{Covariance, Fit, InFrame, NoiseInformation, NoiseUncertainty, in_frame, noise_information};
+use crate::solve::{Covariance, Fit, InFrame, NoiseInformation, NoiseUncertainty, noise_information};
 
 /// Sigmas of a 95 % interval.
 pub const NORMAL_95: f64 = 1.96;
@@ -20,7 +20,7 @@ pub const NORMAL_95: f64 = 1.96;
 pub struct Uncertainty {
     /// What the data tell; none without stops.
     pub identifiability: Option<Identifiability>,
-    /// Covariance of the dense columns with the plates in the frames of their nominal markers ([`in_frame`]): what the tolerance of the
+    /// Covariance of the dense columns with the plates in the frames of their nominal markers ([`Fit::in_frame`]): what the tolerance of the
     /// markers leaves open of the frame of a plate is no error of the robot.
     pub covariance: DMatrix<f64>,
     /// Sigmas of the dense columns by the noise model alone.
@@ -48,7 +48,7 @@ pub struct Uncertainty {
 /// Beside it the plates in their frames, with that covariance.
 ///
 /// # Errors
-/// As [`in_frame`].
+/// As [`Fit::in_frame`].
 pub fn judge(
     fit: &mut Fit,
     joint_noise_is_estimated: bool,
@@ -85,7 +85,7 @@ pub fn judge(
         found.clustered_sigma = Some(by_clusters);
     }
     let fit = &*fit;
-    let in_frame = in_frame(fit.linear(), &fit.covariance)?;
+    let in_frame = fit.in_frame()?;
     let stated = in_frame.dense(n);
     found.take_frames_of_plates(&sigmas(&fit.covariance.reduced), &sigmas(&stated));
     let Adjustment { problem, state } = &fit.adjustment;

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::fit::Fit;
 use crate::geom::{Pose, adjoint};
 use crate::problem::{Adjustment, PlateShape};
-use crate::solve::{InFrame, PlateScale, Similarity, in_frame};
+use crate::solve::{InFrame, PlateScale, Similarity};
 
 /// Plates, their poses and covariances in the frames of their nominal markers.
 pub(super) struct Gauge {
@@ -45,7 +45,7 @@ impl Gauge {
     /// Markers that lie on a line.
     pub fn of_images(fit: &Fit, scales: &[Option<PlateScale>]) -> Result<Self> {
         let size = |plate: usize, found| scales[plate].map_or(found, |scale| 1.0 + scale.relative);
-        let in_frame = in_frame(fit.linear(), &fit.covariance)?;
+        let in_frame = fit.in_frame()?;
         Ok(Self { scales: scales.to_vec(), ..Self::with_sizes(fit, &in_frame, size)? })
     }
 

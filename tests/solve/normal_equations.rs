@@ -4,7 +4,7 @@ use crate::support::dense::{Dense, Unknown};
 use crate::support::small::{Dice, Request, free_poses, problem};
 use nalgebra::{DMatrix, DVector, Vector3};
 use robotcal::assess::{Limits, clustered_covariance};
-use robotcal::fit::{NoEvidence, fit_of_outcome, log_evidence, log_evidence_of_outcome};
+use robotcal::fit::{Fit, NoEvidence, fit_of_outcome, log_evidence, log_evidence_of_outcome};
 use robotcal::identify::{PoseStage, linear_step};
 use robotcal::linalg::SymmetricFactor;
 use robotcal::model::camera::Lens;
@@ -13,7 +13,7 @@ use robotcal::problem::{
     Adjustment, Image, ImageRejection, ObservationRejection, Problem, State, Step, Tie, release_measured_scales,
 };
 use robotcal::series::{CameraMount, ScaleBar};
-use robotcal::solve::{Elimination, Settings, Status, System, solve};
+use robotcal::solve::{Elimination, Settings, Status, System, in_frame, solve};
 
 /// A marker that no image shows.
 const UNSEEN: usize = 7;
@@ -261,6 +261,22 @@ fn the_right_hand_side_is_the_slope_of_the_cost() {
         let numeric = (cost(h) - cost(-h)) / (2.0 * h);
         let unit = slope.abs().max((cov.nrows() as f64).sqrt());
         assert!((numeric - slope).abs() < 1e-3 * unit, "{numeric} {slope}");
+    }
+}
+
+/// What a fit knows of its system already serves where plates are held in their frames, unless distances are a part of it.
+#[test]
+fn plates_in_their_frames_are_the_same_by_the_system_of_the_fit() {
+    for (problem, state) in [with_field(), awkward(CameraMount::Fixed)] {
+        let adjustment = Adjustment { problem, state };
+        let linearised = adjustment.linearise().unwrap();
+        let covariance = adjustment.linear(&linearised).covariance().unwrap();
+        let fit = Fit { adjustment, linearised, covariance };
+        let columns = fit.problem.layout.len();
+        let own = fit.in_frame().unwrap().dense(columns);
+        let anew = in_frame(fit.linear(), &fit.covariance).unwrap().dense(columns);
+        assert!(own.diagonal().min() >= 0.0 && own.diagonal().max() > 0.0);
+        assert_eq!(own, anew);
     }
 }
 

@@ -16,6 +16,8 @@ pub struct Covariance {
     pub reduced: DMatrix<f64>,
     /// The undamped system that it is of.
     pub system: System,
+    /// That system is of the linearisation that the covariance belongs to, and not of one near it.
+    is_of_linearisation: bool,
     /// Factor of its information.
     factor: SymmetricFactor,
     /// Natural logarithm of the determinant of the reduced information.
@@ -44,7 +46,7 @@ impl LinearProblem<'_> {
     pub fn covariance_by(self, which: Elimination) -> Result<Covariance, Singular> {
         let system = System::with(which, self, 0.0);
         let factor = system.factor(self)?;
-        Ok(Covariance::of(&self.adjustment.problem, system, factor))
+        Ok(Covariance { is_of_linearisation: true, ..Covariance::of(&self.adjustment.problem, system, factor) })
     }
 }
 
@@ -64,12 +66,26 @@ pub(super) fn put_first(covariance: &mut DMatrix<f64>, first: &DMatrix<f64>) {
 }
 
 impl Covariance {
-    /// From the factor of a system.
+    /// From the factor of a system, which may be of a linearisation near this one.
     pub(in crate::solve) fn of(problem: &Problem, system: System, factor: SymmetricFactor) -> Self {
         let mut reduced = factor.inverse();
         fixed_are_known(problem, &mut reduced);
         let log_determinant = factor.log_determinant();
-        Self { reduced, log_determinant, system, factor, added: None, enlarged: Vec::new(), replaced: 0 }
+        Self {
+            reduced,
+            log_determinant,
+            system,
+            is_of_linearisation: false,
+            factor,
+            added: None,
+            enlarged: Vec::new(),
+            replaced: 0,
+        }
+    }
+
+    /// Its system, where that is the one of its linearisation.
+    pub(super) fn own_system(&self) -> Option<&System> {
+        (self.is_of_linearisation && self.replaced == 0).then_some(&self.system)
     }
 
     /// Steps for right-hand sides of their own.

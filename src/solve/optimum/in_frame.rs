@@ -12,6 +12,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::covariance::{Covariance, put_first};
+use super::fit::Fit;
 use super::frame::{Frame, frames};
 use crate::error::{Code, Error, Result};
 use crate::model::plate_modes::MODES;
@@ -60,9 +61,27 @@ pub fn in_frame(linear: LinearProblem, stated: &Covariance) -> Result<InFrame> {
 /// # Errors
 /// As [`in_frame`].
 pub fn in_frame_by(which: Elimination, linear: LinearProblem, stated: &Covariance) -> Result<InFrame> {
+    from_system(System::without_distances(which, linear, 0.0), linear, stated)
+}
+
+impl Fit {
+    /// Its covariance with the plates in their frames, as [`in_frame`].
+    ///
+    /// # Errors
+    /// As [`in_frame`].
+    pub fn in_frame(&self) -> Result<InFrame> {
+        let is_whole = self.linearised.distances.is_empty() && self.problem.restraint.is_none();
+        match self.covariance.own_system().filter(|_| is_whole) {
+            Some(system) => from_system(system.clone(), self.linear(), &self.covariance),
+            None => in_frame(self.linear(), &self.covariance),
+        }
+    }
+}
+
+/// From the system without measured distances.
+fn from_system(mut system: System, linear: LinearProblem, stated: &Covariance) -> Result<InFrame> {
     let problem = &linear.adjustment.problem;
     let frames = frames(linear.adjustment)?;
-    let mut system = System::without_distances(which, linear, 0.0);
     let following = following(linear, &system, &frames);
     widen_scales(problem, &frames, &mut system);
     let combinations = combinations(linear, &frames);
