@@ -475,13 +475,15 @@ fn estimate_sizes(at: &mut Adjustment, stage: &PoseStage, model: &mut ErrorModel
     model.covariance(&latents).inverse()
 }
 
-/// Cameras and plates at their optimum given robot, mountings and placements: what their covariance with the poses makes of them. All else is
-/// near what the joint fit has.
+/// Cameras and plates at their optimum given robot, mountings and placements: what their covariance with the poses makes of them. They and all
+/// else are near what the joint fit has.
 fn with_cameras_for_the_robot(at: Adjustment, joint: &Adjustment, sizes: &[f64]) -> Option<State> {
     let problem = with_sizes(&at.problem, Estimator::FullAndRepeatability, sizes);
     let mut given = Adjustment { problem, state: at.state };
     given.hold_poses();
     given.tie_to_readings(sizes.iter().all(|s| *s == 0.0));
+    given.state.cameras.clone_from(&joint.state.cameras);
+    given.state.plates.clone_from(&joint.state.plates);
     let errors = given.state.joint_errors.iter_mut().zip(&joint.state.joint_errors);
     errors.filter(|(own, known)| own.len() == known.len()).for_each(|(own, known)| own.clone_from(known));
     let ties = given.state.ties.iter_mut().zip(&joint.state.ties);
@@ -517,14 +519,20 @@ fn zero_fixed(problem: &Problem, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
 
 /// Solves at given weights; `None` where the normal equations are singular.
 fn gauss_newton(at: &mut Adjustment, stage: &PoseStage, weight: &BlockDiagonal) -> Option<()> {
+    let mut before: Option<f64> = None;
     for _ in 0..STEPS {
         let p = predict(at, stage)?;
         let n = normal(at, &p, weight);
         let step = SymmetricFactor::new(&n.information).ok()?.solve(&n.rhs);
         at.state = moved(at, &step);
-        if step.dot(&n.rhs).max(0.0).sqrt() < DECREMENT {
+        let decrement = step.dot(&n.rhs).max(0.0).sqrt();
+        // Gauss-Newton contracts at least linearly: the next step will be shorter by the same factor, or more.
+        let shrunk = before.filter(|b| decrement < *b);
+        let next = shrunk.map_or(f64::INFINITY, |b| decrement * (decrement / b));
+        if decrement.min(next) < DECREMENT {
             break;
         }
+        before = Some(decrement);
     }
     Some(())
 }
