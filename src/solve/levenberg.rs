@@ -357,6 +357,11 @@ pub(super) struct Minimised {
 }
 
 impl Minimised {
+    /// Where no step follows.
+    pub fn stopped(outcome: Outcome) -> Self {
+        Self { outcome, proposer: Proposer::new() }
+    }
+
     /// With its covariance: that of the last model where this is near the end, else a new one.
     ///
     /// # Errors

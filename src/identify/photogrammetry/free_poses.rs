@@ -19,8 +19,7 @@ use crate::problem::{
 };
 use crate::solve::{
     ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
-    estimate_components, estimate_components_near, frames, in_frame, in_frame_by, reject_contradictory,
-    reject_observations, solve,
+    estimate_components_judged, frames, in_frame, in_frame_by, reject_contradictory, reject_observations, solve,
 };
 use crate::stage::stage;
 
@@ -400,14 +399,11 @@ fn facing(adjustment: &Adjustment, least_tilt: f64) -> Option<Error> {
 fn finish(start: Adjustment, limits: &Limits) -> Result<(Adjustment, FreePoses)> {
     check_views(&start, limits.alike_views_rad)?;
     let options = ComponentOptions { joint: false, rounds: 20, ..ComponentOptions::default() };
-    let mut outcome = estimate_components(start, &options);
-    for _ in 0..ROUNDS {
-        let changed = reject_observations(&mut outcome.adjustment) > 0;
-        if reject_contradictory(&mut outcome.adjustment).is_none() && !changed {
-            break;
-        }
-        outcome = estimate_components_near(outcome.adjustment, &options);
-    }
+    let judge = |adjustment: &mut Adjustment| {
+        let has_changed = reject_observations(adjustment) > 0;
+        reject_contradictory(adjustment).is_some() || has_changed
+    };
+    let outcome = estimate_components_judged(start, &options, (ROUNDS, judge));
     if outcome.status != Status::Converged {
         let problem = &outcome.adjustment.problem;
         let not_converged = || {

@@ -79,13 +79,39 @@ pub fn estimate_components_from_above(start: Adjustment, options: &ComponentOpti
 /// Alternates solving and re-estimating until the components stand. The adjustment keeps the final components.
 pub fn estimate_components(start: Adjustment, options: &ComponentOptions) -> Outcome {
     let rough = rough(&start, options);
-    rounds(minimise(start, &rough), (options, &rough))
+    polish(rounds(minimise(start, &rough), (options, &rough)), options)
 }
 
 /// As [`estimate_components`], from near the end.
 pub fn estimate_components_near(start: Adjustment, options: &ComponentOptions) -> Outcome {
     let rough = rough(&start, options);
-    rounds(minimise_near(start, &rough), (options, &rough))
+    polish(rounds(minimise_near(start, &rough), (options, &rough)), options)
+}
+
+/// As [`estimate_components`], and then as long as `judge` changes what takes part, which says whether it did. What it judges on the way is as good
+/// as the components need; it has the last word where the iteration ends.
+pub fn estimate_components_judged(
+    start: Adjustment,
+    options: &ComponentOptions,
+    (most, mut judge): (usize, impl FnMut(&mut Adjustment) -> bool),
+) -> Outcome {
+    let bounds = rough(&start, options);
+    let (mut minimised, mut is_polished) = (rounds(minimise(start, &bounds), (options, &bounds)), false);
+    for _ in 0..most {
+        minimised = match judge(&mut minimised.outcome.adjustment) {
+            true => {
+                is_polished = false;
+                let bounds = rough(&minimised.outcome.adjustment, options);
+                rounds(minimise_near(minimised.outcome.adjustment, &bounds), (options, &bounds))
+            }
+            false if is_polished => break,
+            false => {
+                is_polished = true;
+                polished(minimised, options)
+            }
+        };
+    }
+    if is_polished { minimised.outcome } else { polish(minimised, options) }
 }
 
 /// Bounds of the solves between rounds.
@@ -95,13 +121,13 @@ fn rough(start: &Adjustment, options: &ComponentOptions) -> Settings {
 }
 
 /// Rounds from the first solve on.
-fn rounds(mut minimised: Minimised, (options, rough): (&ComponentOptions, &Settings)) -> Outcome {
+fn rounds(mut minimised: Minimised, (options, rough): (&ComponentOptions, &Settings)) -> Minimised {
     let mut iterations = minimised.outcome.iterations;
     let mut acceleration = Acceleration::default();
     for round in 0..options.rounds {
         let mut fit = match minimised.fit() {
             Ok(fit) => fit,
-            Err(unsolved) => return Outcome { iterations, ..unsolved.outcome },
+            Err(unsolved) => return Minimised::stopped(Outcome { iterations, ..unsolved.outcome }),
         };
         let (before, factors) = (sizes(&mut fit.problem), fit.problem.noise.pixel_factor.clone());
         let change = fit.update_components(options);
@@ -128,16 +154,26 @@ fn rounds(mut minimised: Minimised, (options, rough): (&ComponentOptions, &Setti
             break;
         }
     }
+    minimised.outcome.iterations = iterations;
+    minimised
+}
+
+/// The bounds of the options after those between rounds.
+fn polished(mut minimised: Minimised, options: &ComponentOptions) -> Minimised {
     if minimised.outcome.status == Status::Converged {
-        let most = options.settings.iterations.min(POLISHING_STEPS);
+        let (most, before) = (options.settings.iterations.min(POLISHING_STEPS), minimised.outcome.iterations);
         minimised = minimised.polished(&Settings { iterations: most, ..options.settings });
-        iterations += minimised.outcome.iterations;
+        minimised.outcome.iterations += before;
         // The rough solve converged to 0.05 sigma; polishing lowered the cost further, if slowly.
         if minimised.outcome.status == Status::OutOfIterations {
             minimised.outcome.status = Status::Converged;
         }
     }
-    Outcome { iterations, ..minimised.outcome }
+    minimised
+}
+
+fn polish(minimised: Minimised, options: &ComponentOptions) -> Outcome {
+    polished(minimised, options).outcome
 }
 
 /// Every component that is not zero, with its smallest value.
