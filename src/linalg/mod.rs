@@ -27,7 +27,9 @@ use rayon::prelude::*;
 #[derive(Debug, Clone)]
 pub struct SymmetricFactor {
     scale: DVector<f64>,
-    /// In the lower triangle; what lies above is not read.
+    /// Rows with anything beside the diagonal, ascending: the others need no factor.
+    coupled: Vec<usize>,
+    /// Of these, in the lower triangle; what lies above is not read.
     factor: DMatrix<f64>,
 }
 
@@ -58,11 +60,12 @@ impl SymmetricFactor {
             return Err(NotPositiveDefinite { row: m.nrows().min(m.ncols()) });
         }
         let scale = m.diagonal().map(|d| 1.0 / d.sqrt());
-        let Some(mut scaled) = scaled_lower(m, &scale) else {
+        let coupled = coupled_rows(m);
+        let Some(mut scaled) = scaled_lower(m, &scale, &coupled) else {
             let is_finite = |i: usize| (0..m.ncols()).all(|j| (m[(i, j)] * scale[i] * scale[j]).is_finite());
             return Err(NotPositiveDefinite { row: (0..m.nrows()).find(|i| !is_finite(*i)).unwrap_or_default() });
         };
-        let needed = factor::cholesky_in_place_scratch::<f64>(m.nrows(), Par::Seq, Default::default());
+        let needed = factor::cholesky_in_place_scratch::<f64>(coupled.len(), Par::Seq, Default::default());
         let (mut memory, options) = (MemBuffer::new(needed), Default::default());
         factor::cholesky_in_place(
             view_mut(&mut scaled),
@@ -71,8 +74,8 @@ impl SymmetricFactor {
             MemStack::new(&mut memory),
             options,
         )
-        .map_err(|factor::LltError::NonPositivePivot { index }| NotPositiveDefinite { row: index })?;
-        Ok(Self { scale, factor: scaled })
+        .map_err(|factor::LltError::NonPositivePivot { index }| NotPositiveDefinite { row: coupled[index] })?;
+        Ok(Self { scale, coupled, factor: scaled })
     }
 
     /// Solves `m x = b`.
@@ -83,31 +86,48 @@ impl SymmetricFactor {
 
     /// Solves `m x = b` for every column of `b`.
     pub fn solve_many(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut x = DMatrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * self.scale[i]);
-        let mut memory = MemBuffer::new(solve::solve_in_place_scratch::<f64>(b.nrows(), b.ncols(), Par::Seq));
+        let Self { scale, coupled, factor } = self;
+        let mut x = DMatrix::from_fn(coupled.len(), b.ncols(), |i, j| b[(coupled[i], j)] * scale[coupled[i]]);
+        let mut memory = MemBuffer::new(solve::solve_in_place_scratch::<f64>(x.nrows(), x.ncols(), Par::Seq));
         let stack = MemStack::new(&mut memory);
-        solve::solve_in_place_with_conj(view(&self.factor), Conj::No, view_mut(&mut x), Par::Seq, stack);
-        DMatrix::from_fn(b.nrows(), b.ncols(), |i, j| x[(i, j)] * self.scale[i])
+        solve::solve_in_place_with_conj(view(factor), Conj::No, view_mut(&mut x), Par::Seq, stack);
+        let mut all = DMatrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * scale[i] * scale[i]);
+        for (mut all, x) in all.column_iter_mut().zip(x.column_iter()) {
+            coupled.iter().zip(x.iter()).for_each(|(&row, x)| all[row] = x * scale[row]);
+        }
+        all
     }
 
     /// The inverse, symmetric to the last bit.
     pub fn inverse(&self) -> DMatrix<f64> {
-        let n = self.scale.len();
+        let Self { scale, coupled, factor } = self;
+        let n = coupled.len();
         let mut lower = DMatrix::zeros(n, n);
         let mut memory = MemBuffer::new(inverse::inverse_scratch::<f64>(n, Par::Seq));
-        inverse::inverse(view_mut(&mut lower), view(&self.factor), Par::Seq, MemStack::new(&mut memory));
+        inverse::inverse(view_mut(&mut lower), view(factor), Par::Seq, MemStack::new(&mut memory));
+        let mut all = match n == scale.len() {
+            true => DMatrix::zeros(0, 0),
+            false => DMatrix::from_diagonal(&scale.map(|own| own * own)),
+        };
         for (j, column) in lower.as_mut_slice().chunks_exact_mut(n.max(1)).enumerate() {
-            let of = self.scale[j];
-            column[j..].iter_mut().zip(&self.scale.as_slice()[j..]).for_each(|(x, scale)| *x *= scale * of);
+            let of = scale[coupled[j]];
+            column[j..].iter_mut().zip(&coupled[j..]).for_each(|(x, &row)| *x *= scale[row] * of);
+            if !all.is_empty() {
+                let mut all = all.column_mut(coupled[j]);
+                column[j..].iter().zip(&coupled[j..]).for_each(|(x, &row)| all[row] = *x);
+            }
         }
-        mirror_lower(&mut lower);
-        lower
+        if all.is_empty() {
+            all = lower;
+        }
+        mirror_lower(&mut all);
+        all
     }
 
     /// Natural logarithm of the determinant.
     pub fn log_determinant(&self) -> f64 {
         let l = &self.factor;
-        let factor: f64 = (0..self.scale.len()).map(|i| 2.0 * l[(i, i)].ln()).sum();
+        let factor: f64 = (0..l.nrows()).map(|i| 2.0 * l[(i, i)].ln()).sum();
         factor - 2.0 * self.scale.iter().map(|s| s.ln()).sum::<f64>()
     }
 }
@@ -220,14 +240,23 @@ pub fn add_gram(a: &mut DMatrix<f64>, y: &DMatrix<f64>, factor: f64) {
     });
 }
 
-/// `m` with its diagonal scaled to one: lower triangle, zeros above. `None` where something in it is not finite.
-fn scaled_lower(m: &DMatrix<f64>, scale: &DVector<f64>) -> Option<DMatrix<f64>> {
+/// Rows of a symmetric matrix, by its lower triangle, with anything beside the diagonal.
+fn coupled_rows(m: &DMatrix<f64>) -> Vec<usize> {
     let n = m.nrows();
+    let below = |j: usize| &m.as_slice()[j * n + j + 1..(j + 1) * n];
+    let is_alone = |j: &usize| below(*j).iter().all(|x| *x == 0.0) && (0..*j).all(|k| m[(*j, k)] == 0.0);
+    (0..n).filter(|j| !is_alone(j)).collect()
+}
+
+/// Some rows and columns of `m` with its diagonal scaled to one: lower triangle, zeros above. `None` where something in it is not finite.
+fn scaled_lower(m: &DMatrix<f64>, scale: &DVector<f64>, rows: &[usize]) -> Option<DMatrix<f64>> {
+    let n = rows.len();
     let (mut scaled, mut is_finite) = (DMatrix::<f64>::zeros(n, n), true);
-    let columns = scaled.as_mut_slice().chunks_exact_mut(n.max(1)).zip(m.as_slice().chunks_exact(n.max(1)));
-    for (j, (into, of)) in columns.enumerate() {
-        let values = of[j..].iter().zip(&scale.as_slice()[j..]);
-        into[j..].iter_mut().zip(values).for_each(|(x, (value, own))| *x = value * own * scale[j]);
+    let columns = scaled.as_mut_slice().chunks_exact_mut(n.max(1)).zip(rows);
+    for (j, (into, &column)) in columns.enumerate() {
+        let of = &m.as_slice()[column * m.nrows()..][..m.nrows()];
+        let values = rows[j..].iter().map(|&row| of[row] * scale[row] * scale[column]);
+        into[j..].iter_mut().zip(values).for_each(|(x, value)| *x = value);
         is_finite &= into[j..].iter().fold(true, |all, x| all & x.is_finite());
     }
     is_finite.then_some(scaled)
@@ -244,24 +273,42 @@ pub fn mirror_upper(a: &mut DMatrix<f64>) {
 
 /// Copies the first rows of the upper triangle to the lower one.
 pub fn mirror_upper_rows(a: &mut DMatrix<f64>, rows: usize) {
-    each_pair(a, rows, |values, above, below| values[below] = values[above]);
+    each_square(a, rows, |values, n, above, columns| copy_transposed(values, n, above, columns));
 }
 
 /// Copies the lower triangle to the upper one.
 fn mirror_lower(a: &mut DMatrix<f64>) {
     let rows = a.nrows();
-    each_pair(a, rows, |values, above, below| values[above] = values[below]);
+    each_square(a, rows, |values, n, above, columns| copy_transposed(values, n, columns, above));
 }
 
-/// Goes through the places of a square matrix above the diagonal in its first rows, each with its place below.
-fn each_pair(a: &mut DMatrix<f64>, rows: usize, pair: impl Fn(&mut [f64], usize, usize)) {
+/// Goes through the part of a square matrix above the diagonal that lies in its first rows: rows and columns of squares, with its values and size. On
+/// the diagonal they are what stands above it in one column.
+fn each_square(a: &mut DMatrix<f64>, rows: usize, copy: impl Fn(&mut [f64], usize, Range<usize>, Range<usize>)) {
     let n = a.ncols();
     let values = a.as_mut_slice();
-    let squares = (0..n).step_by(SQUARE).flat_map(|j| (0..rows.min(j + 1)).step_by(SQUARE).map(move |i| (j, i)));
-    for (first_column, first_row) in squares {
-        for j in first_column..(first_column + SQUARE).min(n) {
-            (first_row..(first_row + SQUARE).min(rows.min(j))).for_each(|i| pair(values, j * n + i, i * n + j));
+    for first in (0..n).step_by(SQUARE) {
+        let columns = first..(first + SQUARE).min(n);
+        for row in (0..rows.min(first)).step_by(SQUARE) {
+            copy(values, n, row..(row + SQUARE).min(rows), columns.clone());
         }
+        columns.for_each(|j| copy(values, n, first..rows.min(j).max(first), j..j + 1));
+    }
+}
+
+/// Copies some rows (at most a square) of some columns of a matrix of `n` rows to the columns and rows of the same numbers.
+fn copy_transposed(values: &mut [f64], n: usize, rows: Range<usize>, columns: Range<usize>) {
+    if rows.len() == 1 || columns.len() == 1 {
+        let places = columns.flat_map(|column| rows.clone().map(move |row| (row, column)));
+        return places.for_each(|(row, column)| values[row * n + column] = values[column * n + row]);
+    }
+    let mut square = [[0.0; SQUARE]; SQUARE];
+    for (k, column) in columns.clone().enumerate() {
+        let of = &values[column * n..][rows.clone()];
+        of.iter().zip(&mut square).for_each(|(value, row)| row[k] = *value);
+    }
+    for (row, of) in rows.zip(&square) {
+        values[row * n..][columns.clone()].copy_from_slice(&of[..columns.len()]);
     }
 }
 
@@ -305,6 +352,40 @@ mod tests {
         let identity = &scaled * f.inverse() * &m * scaled.clone().try_inverse().unwrap();
         assert!((identity - DMatrix::identity(7, 7)).amax() < 1e-9);
         assert!((f.log_determinant() - m.determinant().ln()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn rows_by_themselves_need_no_factor_and_change_nothing() {
+        let own = matrix();
+        let places = [1, 2, 4, 5, 6, 8, 9];
+        let mut whole = DMatrix::from_diagonal(&DVector::from_fn(11, |i, _| (i + 2) as f64));
+        places.iter().enumerate().for_each(|(j, &column)| {
+            places.iter().enumerate().for_each(|(i, &row)| whole[(row, column)] = own[(i, j)]);
+        });
+        let (factor, of_own) = (SymmetricFactor::new(&whole).unwrap(), SymmetricFactor::new(&own).unwrap());
+        let (inverse, inverse_of_own) = (factor.inverse(), of_own.inverse());
+        let x = factor.solve(&DVector::from_element(11, 1.0));
+        let x_of_own = of_own.solve(&DVector::from_element(7, 1.0));
+        for (i, j) in (0..11).flat_map(|i| (0..11).map(move |j| (i, j))) {
+            let place = |row: usize| places.iter().position(|p| *p == row);
+            let expected = match (place(i), place(j)) {
+                (Some(i), Some(j)) => inverse_of_own[(i, j)],
+                _ if i == j => 1.0 / (i + 2) as f64,
+                _ => 0.0,
+            };
+            assert!((inverse[(i, j)] - expected).abs() <= 1e-15 * expected.abs(), "{i} {j}");
+            let alone = 1.0 / (i + 2) as f64;
+            let expected = place(i).map_or(alone, |i| x_of_own[i]);
+            assert!((x[i] - expected).abs() <= 1e-15 * expected.abs(), "{i}");
+        }
+        let alone: f64 = [2.0, 5.0, 9.0, 12.0].iter().map(|d: &f64| d.ln()).sum();
+        assert!((factor.log_determinant() - of_own.log_determinant() - alone).abs() < 1e-12);
+        let mut singular = whole;
+        (0..11).for_each(|k| singular[(9, k)] = singular[(8, k)]);
+        (0..11).for_each(|k| singular[(k, 9)] = singular[(k, 8)]);
+        singular[(9, 9)] -= 1e-9 * singular[(9, 9)];
+        assert_eq!(SymmetricFactor::new(&singular).err(), Some(NotPositiveDefinite { row: 9 }));
+        assert!(SymmetricFactor::new(&DMatrix::from_diagonal_element(3, 3, 4.0)).unwrap().inverse()[(1, 1)] == 0.25);
     }
 
     /// Larger than the squares in which triangles are mirrored, and not a multiple of them.
