@@ -222,8 +222,7 @@ impl<'a> Board<'a> {
 
     /// Measures the corners; how far the sides may be off in common, px.
     fn measure(&self, found: &Found, detection: &mut Detection) -> f64 {
-        let sides: Sides =
-            found.iter().map(|(place, corners)| (*place, self.sides(self.picture, *place, corners))).collect();
+        let sides: Sides = found.iter().map(|(place, corners)| (*place, self.sides(*place, corners))).collect();
         let usual = Usual::of(sides.values().flatten().flatten());
         let sides: Sides = sides.into_iter().map(|(place, four)| (place, usual.undisturbed(four))).collect();
         let own = self.grown(found, &sides);
@@ -274,8 +273,8 @@ impl<'a> Board<'a> {
 
     /// The sides of a tag with these corners. Where its code shines through its border, or its corners lie elsewhere, as those of bent sides
     /// do, once more with the corners that they have.
-    fn sides(&self, picture: &Picture, place: usize, corners: &Quad) -> [Measured; 4] {
-        let (mut corners, mut sides) = (*corners, self.sides_from(picture, place, corners));
+    fn sides(&self, place: usize, corners: &Quad) -> [Measured; 4] {
+        let (mut corners, mut sides) = (*corners, self.sides_from(place, corners));
         for again in 0..MOST_AGAIN {
             let measured = crossings(&sides, &corners);
             let found = [0, 1, 2, 3].map(|k: usize| measured[k].map_or(corners[k], |(uv, _)| uv));
@@ -284,15 +283,15 @@ impl<'a> Board<'a> {
             if !is_elsewhere && !is_lit {
                 break;
             }
-            (corners, sides) = (found, self.sides_from(picture, place, &found));
+            (corners, sides) = (found, self.sides_from(place, &found));
         }
         sides
     }
 
-    fn sides_from(&self, picture: &Picture, place: usize, corners: &Quad) -> [Measured; 4] {
+    fn sides_from(&self, place: usize, corners: &Quad) -> [Measured; 4] {
         let printed = self.print_of(place);
         [0, 1, 2, 3].map(|k: usize| {
-            let line = EdgeLine::fit(picture, &self.side(corners, k), || printed.beside(corners, k))?;
+            let line = EdgeLine::fit(self.picture, &self.side(corners, k), || printed.beside(corners, k))?;
             Ok(line.widened(variance_factor(line.blur_px(), self.smoothing_px)))
         })
     }
