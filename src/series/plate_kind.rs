@@ -33,6 +33,17 @@ pub enum Places {
     Anywhere,
 }
 
+/// Turns after which the print of a plate looks the same, where its places do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Turns {
+    /// None: a code tells how it is turned.
+    Never,
+    /// Those that bring dark squares to dark ones.
+    KeepingColours,
+    /// All.
+    Any,
+}
+
 /// What plate.toml and its marker file have to say of a kind of plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Print {
@@ -48,6 +59,8 @@ pub struct Print {
     pub has_tags: bool,
     /// Whether markers that were missed, or are cut by the border, are looked for where a first solve predicts them.
     pub is_predicted: bool,
+    /// After which turns it may look the same.
+    pub turns: Turns,
 }
 
 /// What most kinds have in common.
@@ -58,6 +71,7 @@ const PLAIN: Print = Print {
     has_radius: false,
     has_tags: false,
     is_predicted: false,
+    turns: Turns::Never,
 };
 
 macro_rules! plate_kinds {
@@ -84,9 +98,9 @@ plate_kinds! {
     /// Discs and annuli of several sizes whose pattern codes the position.
     CodedCircles { ink: Ink::Circles, needs_marker_file: true, is_predicted: true }
     /// A plain grid of dots.
-    CircleGrid { ink: Ink::Circles, places: Places::Lattice, has_radius: true }
+    CircleGrid { ink: Ink::Circles, places: Places::Lattice, has_radius: true, turns: Turns::Any }
     /// A chessboard; the markers are its inner corners.
-    Chessboard { ink: Ink::Squares }
+    Chessboard { ink: Ink::Squares, turns: Turns::KeepingColours }
     /// A chessboard with ArUco markers in its light squares.
     Charuco { ink: Ink::SquaresAndTags, has_tags: true }
     /// A chessboard with dots that code the place; the markers are its inner corners.

@@ -1,6 +1,7 @@
 //! Plates that look the same after a turn.
 
-use super::{Plate, PlateKind};
+use super::plate::Plate;
+use super::plate_kind::Turns;
 
 /// How far a marker may lie from the place of another after a turn, in pitches, and its radius from that one's, as a share.
 const SAME: f64 = 0.1;
@@ -29,10 +30,10 @@ impl Plate {
             2 => odd(self.columns) == odd(self.rows),
             _ => !odd(self.columns) && !odd(self.rows),
         };
-        let allowed = |quarters: &u8| match self.kind {
-            PlateKind::Chessboard => keeps_colours(*quarters),
-            PlateKind::CircleGrid => true,
-            _ => false,
+        let allowed = |quarters: &u8| match self.kind.print().turns {
+            Turns::Never => false,
+            Turns::KeepingColours => keeps_colours(*quarters),
+            Turns::Any => true,
         };
         (1..4).filter(allowed).filter_map(|quarters| self.turned(quarters)).collect()
     }
@@ -60,6 +61,7 @@ impl Plate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::series::plate_kind::PlateKind;
 
     fn quarters(kind: PlateKind, columns: u32, rows: u32) -> Vec<u8> {
         Plate::lattice(kind, columns, rows, 0.01, 1e-4).turns().iter().map(|t| t.quarters).collect()
