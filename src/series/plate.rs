@@ -140,6 +140,11 @@ impl Plate {
                 sigma_m: tolerance_m,
             })
             .collect();
+        Self { markers, ..Self::without_markers(kind, [columns, rows], pitch_m, tolerance_m) }
+    }
+
+    /// A plate whose markers are told elsewhere.
+    pub(super) fn without_markers(kind: PlateKind, [columns, rows]: [u32; 2], pitch_m: f64, tolerance_m: f64) -> Self {
         Self {
             name: None,
             kind,
@@ -152,7 +157,7 @@ impl Plate {
             puzzle: None,
             large: Vec::new(),
             scale: None,
-            markers,
+            markers: Vec::new(),
         }
     }
 }

@@ -167,24 +167,33 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
         return Ok(Plate { scale: file.scale, ..plate_of(tags, file.kind, size, tolerance_m) });
     }
     if print.places == Places::Anywhere {
-        let (columns, rows) = (file.columns.unwrap_or(0), file.rows.unwrap_or(0));
-        let pitch_m = file.pitch_m.unwrap_or(0.0);
-        let scale = file.scale;
-        return Ok(Plate {
-            name: None,
-            kind: file.kind,
-            columns,
-            rows,
-            pitch_m,
-            tolerance_m,
-            aruco: None,
-            tags: None,
-            puzzle: None,
-            large: Vec::new(),
-            scale,
-            markers: Vec::new(),
-        });
+        let size = [file.columns, file.rows].map(|n| n.unwrap_or(0));
+        let bare = Plate::without_markers(file.kind, size, file.pitch_m.unwrap_or(0.0), tolerance_m);
+        return Ok(Plate { scale: file.scale, ..bare });
     }
+    let (size, pitch_m) = lattice_keys(path, file)?;
+    let mut plate = Plate {
+        aruco: aruco(path, file, pitch_m)?,
+        puzzle: puzzle(path, file, size)?,
+        scale: file.scale,
+        ..Plate::lattice(file.kind, size[0], size[1], pitch_m, tolerance_m)
+    };
+    for marker in &mut plate.markers {
+        marker.outer_radius_m = file.radius_m.unwrap_or(0.0);
+    }
+    if (file.asymmetric.is_some() || file.large.is_some()) && !print.has_radius {
+        let what = "asymmetric and large are only for a circle-grid";
+        return Err(Error::new(Code::SettingConflict, path.display(), what, "remove them or correct `kind`"));
+    }
+    if file.asymmetric == Some(true) {
+        plate.shift_rows();
+    }
+    plate.large = large(path, file, size)?;
+    Ok(plate)
+}
+
+/// Columns and rows of a lattice, and its pitch in m.
+fn lattice_keys(path: &Path, file: &PlateFile) -> Result<([u32; 2], f64)> {
     let (Some(columns), Some(rows), Some(pitch_m)) = (file.columns, file.rows, file.pitch_m) else {
         let what = "columns, rows and pitch_m are needed for a plate of this kind";
         return Err(Error::new(Code::SettingMissing, path.display(), what, "add what is missing (pitch in metres)"));
@@ -202,24 +211,7 @@ fn nominal(path: &Path, file: &PlateFile) -> Result<Plate> {
         let what = format!("pitch_m = {pitch_m} makes a plate of {:.0} m", pitch_m * f64::from(columns));
         return Err(Error::new(Code::PlateUnitUnlikely, path.display(), what, "pitch_m is in metres: 18 mm are 0.018"));
     }
-    let mut plate = Plate {
-        aruco: aruco(path, file, pitch_m)?,
-        puzzle: puzzle(path, file, [columns, rows])?,
-        scale: file.scale,
-        ..Plate::lattice(file.kind, columns, rows, pitch_m, tolerance_m)
-    };
-    for marker in &mut plate.markers {
-        marker.outer_radius_m = file.radius_m.unwrap_or(0.0);
-    }
-    if (file.asymmetric.is_some() || file.large.is_some()) && !print.has_radius {
-        let what = "asymmetric and large are only for a circle-grid";
-        return Err(Error::new(Code::SettingConflict, path.display(), what, "remove them or correct `kind`"));
-    }
-    if file.asymmetric == Some(true) {
-        plate.shift_rows();
-    }
-    plate.large = large(path, file, [columns, rows])?;
-    Ok(plate)
+    Ok(([columns, rows], pitch_m))
 }
 
 /// The part of the pattern that a puzzleboard is; no other kind has any.
