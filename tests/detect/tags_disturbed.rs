@@ -278,6 +278,64 @@ fn study_of_tags_in_highlights() {
     }
 }
 
+/// Tags on paper that is lighter than full scale by this factor, through a lens of this blur.
+fn over_exposed(board: (&str, f64, &str), seeds: std::ops::Range<u64>, paper: f64, blur_px: f64) -> Tally {
+    let mut tallies = [Tally::default(), Tally::default()];
+    for seed in seeds {
+        let mut view = view(board.1, &mut ChaCha8Rng::seed_from_u64(seed));
+        view.conditions.psf_sigma_px = blur_px;
+        let scene = scene_of(board, &view);
+        let asked = |id: u32| usize::from(scene.corner(id).is_some_and(|p| scene.within(&p) > 8.0));
+        look(&scene, &Light::even(paper, 1.0), seed, &mut tallies, [&asked, &|_| 0]);
+    }
+    let [all, _] = tallies;
+    all
+}
+
+#[test]
+#[ignore = "a study"]
+fn study_of_over_exposed_tags() {
+    for board in BOARDS {
+        for (paper, blur_px) in [1.3, 1.8].into_iter().flat_map(|paper| [0.2, 0.3, 0.5].map(|blur_px| (paper, blur_px)))
+        {
+            println!(
+                "{:10} paper {paper} blur {blur_px} {}",
+                board.0,
+                over_exposed(board, seeds(), paper, blur_px).said()
+            );
+        }
+    }
+}
+
+/// Single tags of so many px with a blur, in encoded light.
+fn small_in_encoded_light(board: (&str, f64, &str), seeds: std::ops::Range<u64>, side_px: f64, blur_px: f64) -> Tally {
+    let mut tallies = [Tally::default(), Tally::default()];
+    for seed in seeds {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut view = view(board.1, &mut rng);
+        view.distance_m = board.1 * view.focal_px / side_px;
+        view.tilt_deg = rng.random_range(0.0..25.0);
+        view.conditions.psf_sigma_px = blur_px;
+        let scene = scene_of(board, &view);
+        look(&scene, &Light::even(0.72, 1.0 / 2.2), seed, &mut tallies, [&|_| 1, &|_| 0]);
+    }
+    let [all, _] = tallies;
+    all
+}
+
+#[test]
+#[ignore = "a study"]
+fn study_of_small_tags_in_encoded_light() {
+    for board in &BOARDS[..2] {
+        for side_px in [20.0, 25.0, 30.0, 40.0, 60.0, 100.0] {
+            for blur_px in [0.3, 0.6, 1.0, 1.5] {
+                let said = small_in_encoded_light(*board, seeds(), side_px, blur_px).said();
+                println!("{:10} side {side_px} blur {blur_px} {said}", board.0);
+            }
+        }
+    }
+}
+
 /// A border that cuts a side leaves a tag three, two or one corner: in encoded light its sides are displaced as those of others, by 0.3 px and more.
 #[test]
 fn tags_that_the_border_cuts_are_measured_in_encoded_light() {

@@ -23,7 +23,9 @@
 use nalgebra::{Matrix2, SMatrix, Vector2};
 
 use super::edge_shape::PixelShape;
-use super::edge_sums::{BLUR, Column, DARK, FAR_BLURS, FEW_PARAMETERS, Pixel, SHAPE, STEP, Shape, Sums, powers, sums};
+use super::edge_sums::{
+    BLUR, Column, DARK, FAR_BLURS, FEW_PARAMETERS, Normal, Pixel, SHAPE, STEP, Shape, Sums, powers, sums,
+};
 use crate::detect::Picture;
 use crate::detect::circles::normal_tail;
 use crate::detect::shared::{SATURATED, SYSTEMATIC_PX};
@@ -385,26 +387,47 @@ fn bent_by_areas(pixels: &[Pixel], [dark, step]: [f64; 2]) -> [f64; 2] {
     [mean - bend * half * half / 3.0, bend]
 }
 
-/// Prior sigmas of parameters, of a side that begins with these.
-fn prior_sigmas(
-    [second, third, fourth, _]: [f64; 4],
-    length: f64,
-    first: &Column,
-    is_clipped: bool,
-) -> [(usize, f64); 9] {
-    let (level, slope) = (LEVEL * first[STEP], SLOPE_PER_PX * first[STEP]);
-    let part = (first[2].abs() / second).clamp(LEAST_BENT, 1.0);
-    [
-        (2, second),
-        (3, part * third),
-        (4, part * fourth),
-        (BLUR, BLUR_SIGMA),
-        (STEP, if is_clipped { CLIPPED_LEVEL * first[STEP] } else { level }),
-        (STEP + 1, slope),
-        (DARK, level),
-        (DARK + 1, slope),
-        (DARK + 2, slope / (2.0 * length)),
-    ]
+/// What is known of a side before it is fitted.
+struct Priors {
+    /// Where it begins.
+    first: Column,
+    /// Sigmas of parameters.
+    sigmas: [(usize, f64); 9],
+}
+
+impl Priors {
+    fn of([second, third, fourth, _]: [f64; 4], length: f64, first: &Column, is_clipped: bool) -> Self {
+        let (level, slope) = (LEVEL * first[STEP], SLOPE_PER_PX * first[STEP]);
+        let part = (first[2].abs() / second).clamp(LEAST_BENT, 1.0);
+        let sigmas = [
+            (2, second),
+            (3, part * third),
+            (4, part * fourth),
+            (BLUR, BLUR_SIGMA),
+            (STEP, if is_clipped { CLIPPED_LEVEL * first[STEP] } else { level }),
+            (STEP + 1, slope),
+            (DARK, level),
+            (DARK + 1, slope),
+            (DARK + 2, slope / (2.0 * length)),
+        ];
+        Self { first: *first, sigmas }
+    }
+
+    /// The information of pixels with this noise and of the priors, and its gradient at a state.
+    fn with(&self, pixels: &Sums, noise: f64, state: &Column) -> (Normal, Column) {
+        let information = 1.0 / (noise * noise);
+        let (mut normal, mut gradient) = (pixels.normal * information, pixels.gradient * information);
+        for (k, sigma) in self.sigmas {
+            let prior = match k {
+                BLUR => USUAL_BLUR_PX.ln(),
+                STEP | DARK => self.first[k],
+                _ => 0.0,
+            };
+            normal[(k, k)] += 1.0 / (sigma * sigma);
+            gradient[k] -= (state[k] - prior) / (sigma * sigma);
+        }
+        (normal, gradient)
+    }
 }
 
 /// Gauss-Newton steps to the end.
@@ -416,30 +439,17 @@ fn iterate(
 ) -> Result<Fit, &'static str> {
     let mut noise = 0.03 * state[STEP];
     let farthest = (FARTHEST * length).max(FARTHEST_PX);
-    let first = *state;
     let is_clipped = pixels.iter().any(|p| p.saturated);
-    let sigmas = prior_sigmas(bends(picture), length, &first, is_clipped);
+    let priors = Priors::of(bends(picture), length, state, is_clipped);
     for round in 1..=MOST_STEPS {
-        let Sums { mut normal, mut gradient, by_k, square, used, paper } =
-            sums(pixels, state, shape, picture.full_scale);
-        if used < 2 * FEW_PARAMETERS {
+        let all = sums(pixels, state, shape, picture.full_scale);
+        if all.used < 2 * FEW_PARAMETERS {
             return Err("saturated");
         }
-        noise = f64::max((square / (used - FEW_PARAMETERS) as f64).sqrt(), 0.3).min(noise.max(0.3) * 2.0);
-        let information = 1.0 / (noise * noise);
-        normal *= information;
-        gradient *= information;
-        for (k, sigma) in sigmas {
-            let prior = match k {
-                BLUR => USUAL_BLUR_PX.ln(),
-                STEP | DARK => first[k],
-                _ => 0.0,
-            };
-            normal[(k, k)] += 1.0 / (sigma * sigma);
-            gradient[k] -= (state[k] - prior) / (sigma * sigma);
-        }
-        let factor = normal.cholesky().ok_or("no edge")?;
-        let mut step = factor.solve(&gradient);
+        let scatter = (all.square / (all.used - FEW_PARAMETERS) as f64).sqrt();
+        noise = f64::max(scatter, 0.3).min(noise.max(0.3) * 2.0);
+        let (normal, gradient) = priors.with(&all, noise, state);
+        let mut step = normal.cholesky().ok_or("no edge")?.solve(&gradient);
         let largest = (step[0].abs() / 1.0).max(step[1].abs() * length / 2.0).max(step[BLUR].abs() / 0.5);
         let largest = largest.max(moved_px(&step, length)[1] / BEND_STEP_PX);
         // pixels that pass in and out of saturation would have it swing for ever
@@ -453,25 +463,33 @@ fn iterate(
         }
         let rest = if round < MOST_STEPS { AT_REST_PX } else { NEARLY_AT_REST_PX };
         if moved_px(&step, length)[0] < rest {
-            let (contrast, paper_residual) = (state[STEP], (paper.0 / paper.1.max(1.0)).sqrt());
-            let mut covariance = factor.inverse().fixed_view::<SHAPE, SHAPE>(0, 0).into_owned();
-            if !shape.is_nothing() {
-                let response = factor.solve(&(by_k * information)).fixed_rows::<SHAPE>(0).into_owned();
-                covariance += response * response.transpose() * shape.variance(blur);
-                let of_light = (OTHER_SHAPE * contrast / noise).powi(2) * used as f64 / OF_AN_EDGE;
-                covariance[(0, 0)] *= 1.0 + of_light;
-            }
-            let fit = Fit {
-                covariance,
-                common: 0.0,
-                paper_residual,
-                contrast,
-                dark: state[DARK],
-                blur_px: blur,
-                is_lit: false,
-            };
+            let (contrast, paper_residual) = (state[STEP], (all.paper.0 / all.paper.1.max(1.0)).sqrt());
+            // Clipped pixels say that they are no darker than that, which may hold a fit, and measure nothing.
+            let measured = || pixels.iter().filter(|p| !p.saturated);
+            let seen = if is_clipped { sums(measured(), state, shape, picture.full_scale) } else { all };
+            let covariance = covariance(&seen, shape, (&priors, noise), state)?;
+            let (common, dark, is_lit) = (0.0, state[DARK], false);
+            let fit = Fit { covariance, common, paper_residual, contrast, dark, blur_px: blur, is_lit };
             return if noise < WORST * contrast { Ok(fit) } else { Err("disturbed surroundings") };
         }
     }
     Err("no convergence")
+}
+
+/// Covariance of a side by the pixels that measure it.
+fn covariance(
+    seen: &Sums,
+    shape: PixelShape,
+    (priors, noise): (&Priors, f64),
+    state: &Column,
+) -> Result<SMatrix<f64, SHAPE, SHAPE>, &'static str> {
+    let factor = priors.with(seen, noise, state).0.cholesky().ok_or("no edge")?;
+    let mut covariance = factor.inverse().fixed_view::<SHAPE, SHAPE>(0, 0).into_owned();
+    if !shape.is_nothing() {
+        let response = factor.solve(&(seen.by_k / (noise * noise))).fixed_rows::<SHAPE>(0).into_owned();
+        covariance += response * response.transpose() * shape.variance(state[BLUR].exp());
+        let of_light = (OTHER_SHAPE * state[STEP] / noise).powi(2) * seen.used as f64 / OF_AN_EDGE;
+        covariance[(0, 0)] *= 1.0 + of_light;
+    }
+    Ok(covariance)
 }

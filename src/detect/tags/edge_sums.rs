@@ -15,7 +15,7 @@ pub const FEW_PARAMETERS: usize = PARAMETERS - 2;
 pub const BLUR: usize = SHAPE;
 pub const STEP: usize = SHAPE + 1;
 pub const DARK: usize = SHAPE + 3;
-type Normal = SMatrix<f64, PARAMETERS, PARAMETERS>;
+pub type Normal = SMatrix<f64, PARAMETERS, PARAMETERS>;
 pub type Column = SVector<f64, PARAMETERS>;
 pub type Shape = SVector<f64, SHAPE>;
 
@@ -104,7 +104,12 @@ fn add_square(normal: &mut Normal, row: &Column) {
     }
 }
 
-pub fn sums(pixels: &[Pixel], state: &Column, shape: PixelShape, full_scale: f32) -> Sums {
+pub fn sums<'a>(
+    pixels: impl IntoIterator<Item = &'a Pixel>,
+    state: &Column,
+    shape: PixelShape,
+    full_scale: f32,
+) -> Sums {
     let (normal, zeros) = (Normal::zeros(), Column::zeros());
     let mut out = Sums { normal, gradient: zeros, by_k: zeros, square: 0.0, used: 0, paper: (0.0, 0.0) };
     let blur = state[BLUR].exp();
