@@ -273,7 +273,7 @@ pub fn mirror_upper(a: &mut DMatrix<f64>) {
 
 /// Copies the first rows of the upper triangle to the lower one.
 pub fn mirror_upper_rows(a: &mut DMatrix<f64>, rows: usize) {
-    each_square(a, rows, |values, n, above, columns| copy_transposed(values, n, above, columns));
+    each_square(a, rows, copy_transposed);
 }
 
 /// Copies the lower triangle to the upper one.

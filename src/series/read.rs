@@ -308,10 +308,10 @@ fn pictured(
     let names: BTreeSet<String> = on_disk.keys().cloned().collect();
     let others_on_disk = other_files(images, &names)?;
     let others: BTreeSet<String> = others_on_disk.keys().cloned().collect();
-    let mut missing = Vec::new();
     for stop in stops.stops.iter_mut().filter(|_| stops.key == StopKey::Stop) {
         name_image(stop, &names);
     }
+    let mut missing = Vec::new();
     for (stop, line) in stops.stops.iter_mut().zip(lines) {
         // What is no image by its name is looked at like one: what is wrong with it is said of it then.
         match on_disk.get(&stop.image).or_else(|| others_on_disk.get(&stop.image)) {
@@ -348,18 +348,17 @@ fn pictured(
     }
     let named: BTreeSet<&str> = stops.stops.iter().map(|s| s.image.as_str()).collect();
     let unnamed: Vec<String> = names.iter().filter(|n| !named.contains(n.as_str())).cloned().collect();
-    if !unnamed.is_empty() {
-        let table = csv.file_name().unwrap_or_default().display();
-        let what = format!("{} that no row of {table} names: {}", count(unnamed.len()), some(&unnamed));
-        notices.push(Notice::new(
-            Code::ImageUnlisted,
-            images.display(),
-            what,
-            "they are not used; add a row with empty joint cells to use one",
-        ));
-    }
+    notices.extend((!unnamed.is_empty()).then(|| unlisted(images, csv, &unnamed)));
     let (dark, white) = optional_images(images.parent().unwrap_or(images))?;
     Ok(Source::Images { folder: images.to_path_buf(), dark, white })
+}
+
+/// Images that no row of the table names.
+fn unlisted(images: &Path, csv: &Path, unnamed: &[String]) -> Notice {
+    let table = csv.file_name().unwrap_or_default().display();
+    let what = format!("{} that no row of {table} names: {}", count(unnamed.len()), some(unnamed));
+    let remedy = "they are not used; add a row with empty joint cells to use one";
+    Notice::new(Code::ImageUnlisted, images.display(), what, remedy)
 }
 
 /// The image of a stop that joints.csv names without the ending of its file.

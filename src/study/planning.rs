@@ -22,6 +22,7 @@ use crate::plan::visibility::VisibilityLimits;
 use crate::plan::{Budget, Demand, PlanRequest, choose, exact_covariance, flange_m};
 use crate::problem::Adjustment;
 use crate::series::{CameraMount, Plate, PlateKind, ScaleBar};
+use crate::simulate::truth::Truth;
 use crate::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
 use crate::urdf::{Chain, JointKind};
 
@@ -156,6 +157,47 @@ fn world_request(request: &PlanStudyRequest, plate: Plate, seed: u64) -> WorldRe
     world
 }
 
+/// The cell as the user knows it before the first image.
+fn roughly_known(
+    request: &PlanStudyRequest,
+    truth: &Truth,
+    plate: Plate,
+    mut rough: impl FnMut() -> Vector6<f64>,
+) -> Setting {
+    let [width_px, height_px] = [truth.camera.width_px, truth.camera.height_px];
+    Setting {
+        robot: RobotModel::Rigid.robot(request.chain.clone()),
+        camera: Camera::pinhole(Lens::Brown, width_px, height_px, truth.camera.parameters[0].round()),
+        mount: request.mount,
+        mounting: truth.camera_pose.pose().perturbed(&rough()),
+        placements: truth.plate_poses.iter().map(|(n, p)| (n.clone(), p.pose().perturbed(&rough()))).collect(),
+        plate,
+        pixel_sigma_px: PIXEL_SIGMA_PX,
+        joint_sigma: joint_sigma(&request.chain),
+        beside: Beside::default(),
+    }
+}
+
+/// A plan of images as the world takes them.
+fn plan_request(request: &PlanStudyRequest, world: &WorldRequest, setting: Setting) -> PlanRequest {
+    PlanRequest {
+        setting,
+        taken: Vec::new(),
+        count: request.planned,
+        demand: Demand::Workspace,
+        budget: Budget::default(),
+        candidates: CandidateOptions {
+            count: request.candidates,
+            views: world.views,
+            sight: VisibilityLimits { least_markers: world.least_markers, ..VisibilityLimits::default() },
+            seed: world.seed,
+            ..CandidateOptions::default()
+        },
+        rounds: request.rounds,
+        scene: SceneOptions::default(),
+    }
+}
+
 fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
     let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -166,40 +208,9 @@ fn one_world(request: &PlanStudyRequest, seed: u64) -> Result<PlanStudyRow> {
     let mut wanted = world_request(request, printed, seed);
     wanted.images = 1;
     let world = series(&wanted)?;
-    let mut rough = || Vector6::from_fn(|k, _| normal() * if k < 3 { ROUGH.0 } else { ROUGH.1 });
     let truth = &world.truth;
-    let setting = Setting {
-        robot: RobotModel::Rigid.robot(request.chain.clone()),
-        camera: Camera::pinhole(
-            Lens::Brown,
-            truth.camera.width_px,
-            truth.camera.height_px,
-            truth.camera.parameters[0].round(),
-        ),
-        mount: request.mount,
-        mounting: truth.camera_pose.pose().perturbed(&rough()),
-        placements: truth.plate_poses.iter().map(|(n, p)| (n.clone(), p.pose().perturbed(&rough()))).collect(),
-        plate: believed.clone(),
-        pixel_sigma_px: PIXEL_SIGMA_PX,
-        joint_sigma: joint_sigma(&request.chain),
-        beside: Beside::default(),
-    };
-    let chosen = PlanRequest {
-        setting,
-        taken: Vec::new(),
-        count: request.planned,
-        demand: Demand::Workspace,
-        budget: Budget::default(),
-        candidates: CandidateOptions {
-            count: request.candidates,
-            views: wanted.views,
-            sight: VisibilityLimits { least_markers: wanted.least_markers, ..VisibilityLimits::default() },
-            seed,
-            ..CandidateOptions::default()
-        },
-        rounds: request.rounds,
-        scene: SceneOptions::default(),
-    };
+    let rough = || Vector6::from_fn(|k, _| normal() * if k < 3 { ROUGH.0 } else { ROUGH.1 });
+    let chosen = plan_request(request, &wanted, roughly_known(request, truth, believed.clone(), rough));
     let choice = choose(&chosen)?;
     let scene = Scene::new(&chosen.setting, &chosen.scene);
     let mut visited = |postures: Vec<Vec<f64>>| -> Result<SimulatedSeries> {

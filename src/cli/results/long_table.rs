@@ -65,25 +65,7 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     if r.estimator != Estimator::Joint {
         writeln!(out, "estimator {}; by default the fit is joint", r.estimator.title())?;
     }
-    for one in &r.series {
-        let images = || r.images.iter().filter(|i| i.series == one.name);
-        let used = || images().filter(|i| i.is_used());
-        let observations: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
-        if images().next().is_none() {
-            let of_series = r.bodies.stops.iter().filter(|s| s.series == one.name).count();
-            writeln!(out, "series    {}: no images; {of_series} stops", one.name)?;
-            continue;
-        }
-        writeln!(
-            out,
-            "series    {}: {} of {} images used, {observations} observations, {}x{} px",
-            one.name,
-            used().count(),
-            images().count(),
-            one.width_px,
-            one.height_px
-        )?;
-    }
+    series(out, r)?;
     limited(
         out,
         "left out",
@@ -118,6 +100,29 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         identifiability(out, found, "the data determine", MOST_ADVICE)?;
     }
     limited(out, "note", Notice::said_once(&r.notices).iter().map(Notice::coded))
+}
+
+fn series(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
+    for one in &r.series {
+        let images = || r.images.iter().filter(|i| i.series == one.name);
+        let used = || images().filter(|i| i.is_used());
+        let observations: usize = used().map(|i| i.observations.reason.iter().filter(|o| o.is_none()).count()).sum();
+        if images().next().is_none() {
+            let of_series = r.bodies.stops.iter().filter(|s| s.series == one.name).count();
+            writeln!(out, "series    {}: no images; {of_series} stops", one.name)?;
+            continue;
+        }
+        writeln!(
+            out,
+            "series    {}: {} of {} images used, {observations} observations, {}x{} px",
+            one.name,
+            used().count(),
+            images().count(),
+            one.width_px,
+            one.height_px
+        )?;
+    }
+    Ok(())
 }
 
 fn verdict(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {

@@ -21,6 +21,7 @@ use crate::error::{Code, Error, Result};
 use crate::geom::{OrientedBox, Pose};
 use crate::identify::RobotModel;
 use crate::model::camera::Camera;
+use crate::model::robot::Robot;
 use crate::output::camera_formats::read_camera_file;
 use crate::output::restore::{self, entered_offsets};
 use crate::output::solution_json::SolutionRecord;
@@ -427,31 +428,44 @@ fn demand(args: &PlanArgs, chain: &Chain) -> Result<Demand> {
 
 fn setting(args: &PlanArgs, record: Option<&SolutionRecord>, chain: Chain) -> Result<(Setting, Vec<PlannedStop>)> {
     let asked: Option<RobotModel> = args.robot_model.map(Into::into);
-    if let Some(record) = record {
-        if entered_offsets(record)?.iter().any(|offset| *offset != 0.0) {
-            say_line!(
-                "readings  the joint values are those of the controller before the offsets of mastering.csv were entered, as those of the images before"
-            );
-        }
-        let model = asked.unwrap_or_else(|| plan_start::model_of(record, &chain));
-        let (mut setting, taken) = plan_start::from_solution(record, chain, model)?;
-        let others = record.images.iter().filter(|i| i.is_used_on_robot()).count() - images_of(&taken);
-        if others > 0 {
-            say_line!(
-                "images    {others} of other plates than that of the first image are not counted: the accuracy before and after is that without them"
-            );
-        }
-        let new = args.plate_pose.iter().enumerate();
-        let new = new.map(|(k, text)| Ok((format!("new_{k}"), pose_or_file("--plate-pose", text)?)));
-        let taken = setting.with_further_placements(new.collect::<Result<_>>()?, taken);
-        return Ok((setting, taken));
+    match record {
+        Some(record) => setting_of_solution(args, record, chain, asked),
+        None => Ok((setting_of_flags(args, asked.unwrap_or(RobotModel::Rigid).robot(chain))?, Vec::new())),
     }
+}
+
+/// Setting and stops of a solution that further images are planned for.
+fn setting_of_solution(
+    args: &PlanArgs,
+    record: &SolutionRecord,
+    chain: Chain,
+    asked: Option<RobotModel>,
+) -> Result<(Setting, Vec<PlannedStop>)> {
+    if entered_offsets(record)?.iter().any(|offset| *offset != 0.0) {
+        say_line!(
+            "readings  the joint values are those of the controller before the offsets of mastering.csv were entered, as those of the images before"
+        );
+    }
+    let model = asked.unwrap_or_else(|| plan_start::model_of(record, &chain));
+    let (mut setting, taken) = plan_start::from_solution(record, chain, model)?;
+    let others = record.images.iter().filter(|i| i.is_used_on_robot()).count() - images_of(&taken);
+    if others > 0 {
+        say_line!(
+            "images    {others} of other plates than that of the first image are not counted: the accuracy before and after is that without them"
+        );
+    }
+    let new = args.plate_pose.iter().enumerate();
+    let new = new.map(|(k, text)| Ok((format!("new_{k}"), pose_or_file("--plate-pose", text)?)));
+    let taken = setting.with_further_placements(new.collect::<Result<_>>()?, taken);
+    Ok((setting, taken))
+}
+
+fn setting_of_flags(args: &PlanArgs, robot: Robot) -> Result<Setting> {
     let plate = args
         .plate
         .as_ref()
         .ok_or_else(|| Error::new(Code::OptionMissing, "--plate", "is missing", "give plate.toml"))?;
     let plate = read_plate(plate, &mut Vec::new())?;
-    let robot = asked.unwrap_or(RobotModel::Rigid).robot(chain);
     let mount: CameraMount = args.mount.into();
     let mounting = match (&args.hand_camera, mount) {
         (Some(text), _) => pose_or_file("--hand-camera", text)?,
@@ -480,7 +494,7 @@ fn setting(args: &PlanArgs, record: Option<&SolutionRecord>, chain: Chain) -> Re
         let rad = args.joint_noise_mrad / 1e3;
         if *kind == JointKind::Prismatic { 0.1 * rad } else { rad }
     });
-    let setting = Setting {
+    Ok(Setting {
         joint_sigma: joint_sigma.collect(),
         camera: camera(args)?,
         mount,
@@ -490,8 +504,7 @@ fn setting(args: &PlanArgs, record: Option<&SolutionRecord>, chain: Chain) -> Re
         pixel_sigma_px: args.pixel_noise_px,
         robot,
         beside: Beside::default(),
-    };
-    Ok((setting, Vec::new()))
+    })
 }
 
 fn camera(args: &PlanArgs) -> Result<Camera> {

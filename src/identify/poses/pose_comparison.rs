@@ -66,6 +66,29 @@ struct Pair {
     other: Pose,
 }
 
+impl Pair {
+    /// Square of a twist between both over the covariance, per component.
+    fn normalised(&self, twist: &Vector6<f64>) -> Option<f64> {
+        let unit = self.covariance.diagonal().map(|v| v.max(f64::MIN_POSITIVE).sqrt());
+        let scaled = Matrix6::from_fn(|i, k| self.covariance[(i, k)] / unit[i] / unit[k]);
+        let e = twist.component_div(&unit);
+        Some(e.dot(&scaled.cholesky()?.solve(&e)) / 6.0)
+    }
+}
+
+/// Images of which both have a pose.
+fn pairs(found: &StandAlone, others: &[(String, Pose)]) -> Vec<Pair> {
+    let stem = |name: &str| name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned();
+    (found.fit.problem.images.iter().zip(&found.free_poses.poses))
+        .filter_map(|(image, pose)| {
+            let placed = &pose.as_ref()?.in_frame;
+            let (_, other) = others.iter().find(|(n, _)| *n == image.name || *n == stem(&image.name))?;
+            let (own, covariance) = (placed.plate_from_camera, placed.covariance);
+            Some(Pair { image: image.name.clone(), own, covariance, other: *other })
+        })
+        .collect()
+}
+
 /// Compares with poses by the name of the image, or by that without its extension.
 ///
 /// # Errors
@@ -76,16 +99,7 @@ pub fn compare_poses(
     body: OtherBody,
     place: &str,
 ) -> Result<PoseComparison> {
-    let problem = &found.fit.problem;
-    let stem = |name: &str| name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned();
-    let pairs: Vec<Pair> = (problem.images.iter().zip(&found.free_poses.poses))
-        .filter_map(|(image, pose)| {
-            let placed = &pose.as_ref()?.in_frame;
-            let (_, other) = others.iter().find(|(n, _)| *n == image.name || *n == stem(&image.name))?;
-            let (own, covariance) = (placed.plate_from_camera, placed.covariance);
-            Some(Pair { image: image.name.clone(), own, covariance, other: *other })
-        })
-        .collect();
+    let pairs = pairs(found, others);
     if pairs.len() < FEWEST {
         let what = format!("has {} poses of images that were measured; {FEWEST} are needed", pairs.len());
         return Err(Error::new(
@@ -123,13 +137,7 @@ pub fn compare_poses(
         sigmas = rms(pairs.iter().map(|p| residual(p, (&x, &y, scale)))).map(|s| s.max(f64::MIN_POSITIVE.sqrt()));
     }
     let twists: Vec<Vector6<f64>> = pairs.iter().map(|p| residual(p, (&x, &y, scale))).collect();
-    let normalised = pairs.iter().zip(&twists).filter_map(|(p, e)| {
-        let unit = p.covariance.diagonal().map(|v| v.max(f64::MIN_POSITIVE).sqrt());
-        let scaled = Matrix6::from_fn(|i, k| p.covariance[(i, k)] / unit[i] / unit[k]);
-        let e = e.component_div(&unit);
-        Some(e.dot(&scaled.cholesky()?.solve(&e)) / 6.0)
-    });
-    let normalised = normalised.sum::<f64>() / pairs.len() as f64;
+    let normalised = pairs.iter().zip(&twists).filter_map(|(p, e)| p.normalised(e)).sum::<f64>() / pairs.len() as f64;
     let rms = rms(twists.iter().copied());
     let differences = pairs.into_iter().zip(twists).map(|(p, twist)| PoseDifference { image: p.image, twist });
     Ok(PoseComparison { differences: differences.collect(), rms, relative_scale: scale, normalised })

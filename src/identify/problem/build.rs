@@ -33,7 +33,7 @@ const FIRST_DISPLACEMENT: f64 = 1e-3;
 /// With `local_errors` the errors of readings that stops have in common become columns.
 pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limits: &Limits) -> Result<Adjustment> {
     let (mut stops, places) = stops_of(series);
-    let pictured = Pictured::of(series, &places, limits)?;
+    let mut pictured = Pictured::of(series, &places, limits)?;
     let bodies = Bodies::of(series, &places);
     let runs = stops.last().map_or(0, |s| s.series + 1);
     let mut robot = robot.clone();
@@ -53,28 +53,9 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         plates: pictured.plates.iter().map(PlateShape::nominal).collect(),
         joint_errors: vec![Vec::new(); stops.len()],
         ties: vec![Tie::Free(Pose::identity()); pictured.images.len()],
-        cameras: pictured.lenses,
+        cameras: std::mem::take(&mut pictured.lenses),
     };
-    let names = Names {
-        mountings: &pictured.mountings,
-        placements: &pictured.placements,
-        cameras: &pictured.cameras,
-        plates: &pictured.plate_names,
-        instruments: &bodies.instruments,
-        bodies: &bodies.names,
-    };
-    let mut layout = Layout::new(&state, &names);
-    release_measured_scales(&mut layout, &pictured.plates);
-    for s in series.iter().filter(|s| s.known_camera.as_ref().is_some_and(|k| k.held)) {
-        let own = pictured.cameras.iter().position(|c| *c == s.camera).map(|k| layout.cameras[k].clone());
-        own.into_iter().flatten().for_each(|c| layout.columns[c].free = false);
-    }
-    bodies.hold_unseen_turns(&mut layout);
-    for (plate, shape) in layout.shapes.clone().into_iter().enumerate() {
-        let is_circle = |o: &MarkerObservation| o.mark != Mark::Corner;
-        let own = pictured.images.iter().filter(|image| image.plate == plate);
-        layout.columns[shape.start + DOT_GAIN].free = own.flat_map(|i| i.observations.iter()).any(is_circle);
-    }
+    let layout = layout(&state, series, &pictured, &bodies);
     let noise = Noise {
         pixel_factor: vec![1.0; pictured.cameras.len()],
         joint: vec![vec![FIRST_JOINT_NOISE; readings]; runs],
@@ -105,6 +86,31 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     let sizes = if problem.tells_displacements().contains(&true) { DISPLACEMENT_SIZES } else { 1 };
     problem.noise.displacement = vec![FIRST_DISPLACEMENT; runs * sizes];
     Ok(Adjustment { problem, state })
+}
+
+/// The columns of the problem: free are those of which the observations tell something and that nobody holds.
+fn layout(state: &State, series: &[MeasuredSeries], pictured: &Pictured, bodies: &Bodies) -> Layout {
+    let names = Names {
+        mountings: &pictured.mountings,
+        placements: &pictured.placements,
+        cameras: &pictured.cameras,
+        plates: &pictured.plate_names,
+        instruments: &bodies.instruments,
+        bodies: &bodies.names,
+    };
+    let mut layout = Layout::new(state, &names);
+    release_measured_scales(&mut layout, &pictured.plates);
+    for s in series.iter().filter(|s| s.known_camera.as_ref().is_some_and(|k| k.held)) {
+        let own = pictured.cameras.iter().position(|c| *c == s.camera).map(|k| layout.cameras[k].clone());
+        own.into_iter().flatten().for_each(|c| layout.columns[c].free = false);
+    }
+    bodies.hold_unseen_turns(&mut layout);
+    for (plate, shape) in layout.shapes.clone().into_iter().enumerate() {
+        let is_circle = |o: &MarkerObservation| o.mark != Mark::Corner;
+        let own = pictured.images.iter().filter(|image| image.plate == plate);
+        layout.columns[shape.start + DOT_GAIN].free = own.flat_map(|i| i.observations.iter()).any(is_circle);
+    }
+    layout
 }
 
 /// The images of all series, and what they are of, each named once.

@@ -1,12 +1,10 @@
 //! External axes: where moves leave those that the description lacks. One that a target does not use (`9E9`) keeps its place.
 
-use std::ops::Range;
-
 use super::moves::{external_target_of, writes_found};
 use super::off_zero::places;
 use super::statements::arguments;
 use super::still::is_still;
-use super::value::{Node, array_of, external_name, is_set};
+use super::value::{ExternalAxes, Node, array_of, external_name, is_set};
 use super::{Datum, Task};
 use crate::programs::external::NO_AXIS;
 use crate::programs::flow::Either;
@@ -133,11 +131,7 @@ impl Task<'_> {
     }
 
     /// Refuses a target whose axes do not go where it says: one is moved independently of it, or external ones by more.
-    pub(super) fn goes_as_told(
-        &self,
-        is_of_joints: bool,
-        external: &Understood<[(f64, Range<usize>); 6]>,
-    ) -> Understood<()> {
+    pub(super) fn goes_as_told(&self, is_of_joints: bool, external: &Understood<ExternalAxes>) -> Understood<()> {
         let known = self.setting.external_axes();
         let left = |words| Err(Why::new(LeftReason::ExternalAxis, words));
         if !is_of_joints && self.has_seventh_joint() {
@@ -174,7 +168,7 @@ impl Task<'_> {
     }
 
     /// Refuses a pose that does not use an axis which the description lacks and which may stand elsewhere than at zero.
-    pub(super) fn keeps_at_zero(&self, external: &[(f64, Range<usize>); 6]) -> Understood<()> {
+    pub(super) fn keeps_at_zero(&self, external: &ExternalAxes) -> Understood<()> {
         let known = self.setting.external_axes();
         let leaves_out = |axis| axis >= known && external.get(axis).is_none_or(|(value, _)| *value >= NO_AXIS);
         let why = self.switching.now().off_zero.value().why_kept(leaves_out, external_name);

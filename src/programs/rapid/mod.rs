@@ -45,8 +45,8 @@ use switching::{Now, Switching};
 use untold::Untold;
 use uses::Use;
 use value::{
-    Displacement, Node, TYPES, array_of, check, computed, element, foreign_axis, is_of_external_axes, is_placeholder,
-    is_set, node, numbers, undeclared,
+    Displacement, ExternalAxes, Node, TYPES, array_of, check, computed, element, foreign_axis, is_of_external_axes,
+    is_placeholder, is_set, node, numbers, undeclared,
 };
 
 const DIALECT: Dialect =
@@ -377,6 +377,18 @@ impl Task<'_> {
             let frames = Box::new(self.beside_joints(tool, work));
             return Ok(TargetKind::Joints(JointTarget { frames, ..self.joints(&parts[0], &external?, file)? }));
         }
+        let pose = self.pose(parts, file, external, (tool, work))?;
+        Ok(TargetKind::Pose(Box::new(pose)))
+    }
+
+    /// The pose of a robtarget.
+    fn pose(
+        &self,
+        parts: &[Node],
+        file: usize,
+        external: Understood<ExternalAxes>,
+        (tool, work): (Option<&str>, std::result::Result<Pose, Untold>),
+    ) -> Understood<PoseTarget> {
         if *self.switching.now().displaced.value() {
             let words = "a program displacement (PDispOn, PDispSet) may be active";
             return Err(Why::new(LeftReason::FrameUnknown, words));
@@ -412,7 +424,7 @@ impl Task<'_> {
         for (&reading, (value, _)) in axes.iter().skip(6).zip(&external) {
             fixed[reading] = Some(if *value < NO_AXIS { value * self.unit(reading).0 } else { f64::NAN });
         }
-        Ok(TargetKind::Pose(Box::new(PoseTarget {
+        Ok(PoseTarget {
             position: trans.map(|t| field(t, 1e-3, DECIMALS_MM)),
             rotation: RotationFields::Quaternion([x, y, z, w].map(|q| field(q, 1.0, DECIMALS_QUATERNION))),
             base_from_work: self.setting.base * work.or_else(|untold| untold.or_stated(self.setting.work))?,
@@ -422,11 +434,11 @@ impl Task<'_> {
             taught: None,
             displaced: None,
             joint_fields: vec![None; axes.len()],
-        })))
+        })
     }
 
     /// External axes of a target; where they are computed, none where they move nothing.
-    fn external(&self, parts: &[Node]) -> Understood<[(f64, Range<usize>); 6]> {
+    fn external(&self, parts: &[Node]) -> Understood<ExternalAxes> {
         let matters = self.setting.axes.len() > 6 || !self.setting.axes_apart;
         match parts.last().and_then(numbers::<6>) {
             None if matters => Err(Why::computed()),
@@ -442,7 +454,7 @@ impl Task<'_> {
         }
     }
 
-    fn joints(&self, axes: &Node, external: &[(f64, Range<usize>); 6], file: usize) -> Understood<JointTarget> {
+    fn joints(&self, axes: &Node, external: &ExternalAxes, file: usize) -> Understood<JointTarget> {
         let values = numbers::<6>(axes)
             .ok_or_else(|| Why::new(LeftReason::Computed, "it is computed, not written in numbers"))?;
         let n = self.setting.axes.len();

@@ -167,10 +167,6 @@ impl Switching {
 
     /// A statement that begins with a word.
     pub fn statement(&mut self, reader: &Reader<'_>, word: &str, way: &mut Itinerary) {
-        let line_has = |wanted: &[u8]| {
-            let line = (1..).map_while(|k| reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd));
-            line.into_iter().any(|t| reader.text(t).eq_ignore_ascii_case(wanted))
-        };
         if let Some((which, state)) = switch(reader) {
             self.now.0.watched[which].set(state);
         }
@@ -188,26 +184,7 @@ impl Switching {
         match word {
             w if ROUTINES.contains(&w) => {
                 way.start_afresh();
-                let is_main = line_has(b"main");
-                let uncalled = (self.anything(!is_main), Stands::default());
-                self.flow.all_end(&mut self.now);
-                self.flow.routine_begins(routine_name(reader), &mut self.now, &uncalled);
-                // Modules that are not given may call it, too.
-                self.now = self.now.merged(&uncalled, "");
-                self.cycle.begins(is_main && !self.flow.is_called(&routine_name(reader)));
-                if self.cycle.is_main {
-                    self.now.1 = Stands::begin();
-                    if let Some((left, stands)) = self.flow.passed(AGAIN) {
-                        self.now.0.moves_on_from(left);
-                        self.now.1 = self.now.1.merged(stands, "");
-                    }
-                }
-                self.top = self.now.0.clone();
-                (self.handler, self.may_have_failed) = (None, false);
-                if word == "TRAP" {
-                    // Interrupts wait for its end.
-                    self.now.0.beside.begin(BTreeSet::new());
-                }
+                self.routine_begins(reader, word);
             }
             "ENDPROC" | "ENDFUNC" | "ENDTRAP" => {
                 self.part_ends();
@@ -223,22 +200,48 @@ impl Switching {
                 way.next_branch();
                 self.flow.next(&mut self.now, matches!(word, "ELSE" | "DEFAULT"));
             }
-            "ERROR" | "UNDO" | "BACKWARD" => {
-                // From anywhere in the routine.
-                self.part_ends();
-                self.flow.returns(&self.now);
-                self.now.0 = self.now.0.clone().anywhere(&self.top);
-                way.lose(&mut self.now.1);
-                if word == "ERROR" {
-                    self.flow.arrives();
-                    let top = self.now.at_top();
-                    self.handler = Some(std::mem::replace(&mut self.now, top));
-                }
-            }
+            "ERROR" | "UNDO" | "BACKWARD" => self.handler_begins(word, way),
             "ENDIF" | "ENDTEST" | "ENDWHILE" | "ENDFOR" => self.branches_end(way),
             _ => self.step(reader, word, way),
         }
         self.top.note(&self.now.0);
+    }
+
+    /// A routine begins: from where the files call it, and from anywhere, as modules that are not given may call it, too.
+    fn routine_begins(&mut self, reader: &Reader<'_>, word: &str) {
+        let mut line = (1..).map_while(|k| reader.ahead(k).filter(|t| t.kind != TokenKind::LineEnd));
+        let is_main = line.any(|t| reader.text(t).eq_ignore_ascii_case(b"main"));
+        let uncalled = (self.anything(!is_main), Stands::default());
+        self.flow.all_end(&mut self.now);
+        self.flow.routine_begins(routine_name(reader), &mut self.now, &uncalled);
+        self.now = self.now.merged(&uncalled, "");
+        self.cycle.begins(is_main && !self.flow.is_called(&routine_name(reader)));
+        if self.cycle.is_main {
+            self.now.1 = Stands::begin();
+            if let Some((left, stands)) = self.flow.passed(AGAIN) {
+                self.now.0.moves_on_from(left);
+                self.now.1 = self.now.1.merged(stands, "");
+            }
+        }
+        self.top = self.now.0.clone();
+        (self.handler, self.may_have_failed) = (None, false);
+        if word == "TRAP" {
+            // Interrupts wait for its end.
+            self.now.0.beside.begin(BTreeSet::new());
+        }
+    }
+
+    /// A handler begins, which is come to from anywhere in the routine.
+    fn handler_begins(&mut self, word: &str, way: &mut Itinerary) {
+        self.part_ends();
+        self.flow.returns(&self.now);
+        self.now.0 = self.now.0.clone().anywhere(&self.top);
+        way.lose(&mut self.now.1);
+        if word == "ERROR" {
+            self.flow.arrives();
+            let top = self.now.at_top();
+            self.handler = Some(std::mem::replace(&mut self.now, top));
+        }
     }
 
     /// All that the routines of the files may have switched.

@@ -24,6 +24,9 @@ pub(super) enum Node {
     Other,
 }
 
+/// Values of the external axes of a target, mm or degrees, and where they are written.
+pub(super) type ExternalAxes = [(f64, Range<usize>); 6];
+
 impl Node {
     /// Place and quaternion, and confdata and external axes, which may be computed.
     pub fn is_robtarget(&self) -> bool {
@@ -262,7 +265,7 @@ pub(super) fn is_of_external_axes(target: &Node) -> bool {
 }
 
 /// The first external axis behind the `known` axes, the robot's six included, that is not at zero.
-pub(super) fn foreign_axis(external: &[(f64, Range<usize>); 6], known: usize) -> Option<(String, f64)> {
+pub(super) fn foreign_axis(external: &ExternalAxes, known: usize) -> Option<(String, f64)> {
     let foreign = external.iter().map(|(value, _)| *value).enumerate().skip(known.saturating_sub(6));
     let mut off_zero = foreign.filter(|(_, value)| *value != 0.0 && *value < NO_AXIS);
     off_zero.next().map(|(axis, value)| (external_name(axis), value))

@@ -161,25 +161,7 @@ impl<'a> Collector<'a> {
         let mut frames = std::mem::take(&mut self.open[stop].frames);
         frames.sort_by_key(|(time, _)| *time);
         self.held -= frames.iter().map(|(_, frame)| frame.bytes()).sum::<usize>();
-        let mut mean = Mean::default();
-        let mut seen: Vec<(usize, f64)> = Vec::new();
-        let sizes: Vec<u64> = frames.iter().map(|(_, frame)| frame.decoded_bytes()).collect();
-        for batch in batches(&sizes, MOST_IN_FLIGHT) {
-            let decoded: Vec<Decoded<(DynamicImage, f64)>> = (frames[batch.clone()].par_iter())
-                .map(|(_, frame)| frame.decode().map(|p| (pixels::sharpness(&p), p)).map(|(s, p)| (p, s)))
-                .collect();
-            for (k, picture) in batch.zip(decoded) {
-                match picture {
-                    Ok((picture, sharpness)) => {
-                        seen.push((k, sharpness));
-                        if self.options.picking == Picking::Average {
-                            mean.add(&picture);
-                        }
-                    }
-                    Err(reason) => self.taken.reject(reason),
-                }
-            }
-        }
+        let (seen, mean) = self.look_at(&frames);
         // The first of equally sharp ones, so that the choice does not depend on anything else.
         let Some((best, sharpness)) = seen.iter().copied().reduce(|a, b| if b.1 > a.1 { b } else { a }) else {
             return Ok(());
@@ -221,6 +203,29 @@ impl<'a> Collector<'a> {
         };
         self.taken.rows.insert(time, (stop, report));
         Ok(())
+    }
+
+    /// Which pictures can be read and how sharp they are, and their mean where that is wanted.
+    fn look_at(&mut self, frames: &[(i64, Frame)]) -> (Vec<(usize, f64)>, Mean) {
+        let (mut seen, mut mean) = (Vec::new(), Mean::default());
+        let sizes: Vec<u64> = frames.iter().map(|(_, frame)| frame.decoded_bytes()).collect();
+        for batch in batches(&sizes, MOST_IN_FLIGHT) {
+            let decoded: Vec<Decoded<(DynamicImage, f64)>> = (frames[batch.clone()].par_iter())
+                .map(|(_, frame)| frame.decode().map(|p| (pixels::sharpness(&p), p)).map(|(s, p)| (p, s)))
+                .collect();
+            for (k, picture) in batch.zip(decoded) {
+                match picture {
+                    Ok((picture, sharpness)) => {
+                        seen.push((k, sharpness));
+                        if self.options.picking == Picking::Average {
+                            mean.add(&picture);
+                        }
+                    }
+                    Err(reason) => self.taken.reject(reason),
+                }
+            }
+        }
+        (seen, mean)
     }
 
     fn write_png(&self, time: i64, picture: &DynamicImage) -> Result<String> {

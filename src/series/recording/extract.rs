@@ -187,20 +187,8 @@ fn groups(
     (open, sigma_s): (i64, Option<f64>),
 ) -> Result<Vec<Group>> {
     let still = standstills(postures, options.still_speed, nanoseconds(options.least_still_s));
-    let mut groups: Vec<Group> = Vec::new();
-    let (mut empty, mut used, mut standing) = (0, 0, Standing::default());
-    for standstill in &still {
-        let Standstill { from_ns, to_ns } = shrunk(*standstill);
-        let (from_ns, to_ns) = (from_ns + open.max(0), to_ns + open.min(0));
-        let first = times.partition_point(|t| *t < from_ns);
-        let inside = &times[first..times.partition_point(|t| *t <= to_ns).max(first)];
-        used += inside.len();
-        standing.add([from_ns, to_ns], times);
-        match inside {
-            [] => empty += 1,
-            _ => groups.push(spread(inside)),
-        }
-    }
+    let Inside { mut groups, used, standing } = Inside::of(&still, times, open);
+    let empty = still.len() - groups.len();
     let place = scan.recording.display().to_string();
     if let Motion::Accept { interval_s } = options.motion {
         if open != 0 {
@@ -228,12 +216,8 @@ fn groups(
     }
     if empty > 0 {
         let what = format!("{empty} of {} standstills have no image", still.len());
-        scan.notices.push(Notice::new(
-            Code::StandstillWithoutImage,
-            &place,
-            what,
-            "wait longer at each stop, or check the stamps of the images",
-        ));
+        let remedy = "wait longer at each stop, or check the stamps of the images";
+        scan.notices.push(Notice::new(Code::StandstillWithoutImage, &place, what, remedy));
     }
     let short = short(postures, times, options);
     if options.motion == Motion::Refuse && short > groups.len() && !groups.is_empty() {
@@ -251,6 +235,34 @@ fn groups(
         return Err(no_stop(&place, postures, [still.len(), short], options));
     }
     Ok(groups)
+}
+
+/// Images within standstills.
+#[derive(Debug, Default)]
+struct Inside {
+    /// Of each standstill that has any.
+    groups: Vec<Group>,
+    /// How many images there are in all standstills.
+    used: usize,
+    standing: Standing,
+}
+
+impl Inside {
+    fn of(still: &[Standstill], times: &[i64], open: i64) -> Self {
+        let mut all = Self::default();
+        for standstill in still {
+            let Standstill { from_ns, to_ns } = shrunk(*standstill);
+            let (from_ns, to_ns) = (from_ns + open.max(0), to_ns + open.min(0));
+            let first = times.partition_point(|t| *t < from_ns);
+            let inside = &times[first..times.partition_point(|t| *t <= to_ns).max(first)];
+            all.used += inside.len();
+            all.standing.add([from_ns, to_ns], times);
+            if !inside.is_empty() {
+                all.groups.push(spread(inside));
+            }
+        }
+        all
+    }
 }
 
 /// Standstills of the time in which images were taken.

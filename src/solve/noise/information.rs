@@ -61,32 +61,21 @@ impl Spread {
     }
 }
 
-/// The information at a solution; `None` without joint noise, or where the data do not tell it at all.
-pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
-    let (linear, Adjustment { problem, state }, cov) = (fit.linear(), &fit.adjustment, &fit.covariance);
+/// The information of the data on so many variances, and the latents of all stops, where they are taken together.
+fn from_data(fit: &Fit, cov: &Covariance, sizes: usize) -> (DMatrix<f64>, Vec<Latent>) {
+    let (linear, Adjustment { problem, state }) = (fit.linear(), &fit.adjustment);
     let (readings, series) = (state.robot.chain.readings.len(), problem.noise.joint.len());
-    let latent: usize = linear.stops().map(|stop| stop.unknowns()).sum();
-    let coupled = if cov.system.latent_start.is_empty() && latent <= MOST_COUPLED {
-        Some(linear.covariance_by(Elimination::Markers).ok()?)
-    } else {
-        None
-    };
-    let cov = coupled.as_ref().unwrap_or(cov);
-    let of_errors = problem.noise.latent_sizes();
     let twists = problem.families.iter().find(|f| f.is_of_twists());
-    let variances: Vec<f64> = of_errors.chain(twists.map(|f| f.factor)).map(|s| s * s).collect();
-    let of_twists = variances.len() - usize::from(twists.is_some());
-    let mut information = DMatrix::zeros(variances.len(), variances.len());
+    let mut information = DMatrix::zeros(sizes, sizes);
     let mut add = |a: &Latent, b: &Latent, covariance: f64| {
         let r = f64::from(a.row == b.row) - covariance / (a.sigma * b.sigma);
         for (ca, pa) in a.parts {
             b.parts.iter().for_each(|(cb, pb)| information[(ca, *cb)] += 0.5 * pa * r * r * pb);
         }
     };
-    let first = series * readings;
     let touched = |c: usize| problem.layout.columns[c].free && cov.system.touched(c);
-    let mut dense = local_latents(&fit.adjustment, touched, first);
-    dense.extend(twists.into_iter().flat_map(|f| twist_latents(problem, f, touched, of_twists)));
+    let mut dense = local_latents(&fit.adjustment, touched, series * readings);
+    dense.extend(twists.into_iter().flat_map(|f| twist_latents(problem, f, touched, sizes - 1)));
     for a in &dense {
         dense.iter().for_each(|b| add(a, b, cov.reduced[(a.row, b.row)]));
     }
@@ -112,11 +101,30 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
         }
         together = dense.into_iter().chain(all).collect();
     }
+    (information, together)
+}
+
+/// The information at a solution; `None` without joint noise, or where the data do not tell it at all.
+pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
+    let (linear, Adjustment { problem, state }, cov) = (fit.linear(), &fit.adjustment, &fit.covariance);
+    let (readings, series) = (state.robot.chain.readings.len(), problem.noise.joint.len());
+    let latent: usize = linear.stops().map(|stop| stop.unknowns()).sum();
+    let coupled = if cov.system.latent_start.is_empty() && latent <= MOST_COUPLED {
+        Some(linear.covariance_by(Elimination::Markers).ok()?)
+    } else {
+        None
+    };
+    let cov = coupled.as_ref().unwrap_or(cov);
+    let of_errors = problem.noise.latent_sizes();
+    let twists = problem.families.iter().find(|f| f.is_of_twists());
+    let variances: Vec<f64> = of_errors.chain(twists.map(|f| f.factor)).map(|s| s * s).collect();
+    let of_twists = variances.len() - usize::from(twists.is_some());
+    let (mut information, together) = from_data(fit, cov, variances.len());
     let touched: Vec<usize> = (0..variances.len()).filter(|&c| information[(c, c)] > 0.0).collect();
     touched.iter().find(|c| **c < of_twists)?;
     let of_touched =
         |m: &DMatrix<f64>| DMatrix::from_fn(touched.len(), touched.len(), |a, b| m[(touched[a], touched[b])]);
-    let from_data = of_touched(&information);
+    let of_data = of_touched(&information);
     draw_together(
         &problem.noise,
         &state.robot.chain.reading_kinds,
@@ -129,7 +137,7 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
     }
     let factor = SymmetricFactor::new(&of_touched(&information)).ok()?;
     let covariance = factor.inverse();
-    let scatter = &covariance * from_data * &covariance;
+    let scatter = &covariance * of_data * &covariance;
     let locals = problem.noise.local.len();
     Some(NoiseInformation { readings, series, locals, variances, covariance, touched, scatter, together, coupled })
 }

@@ -178,80 +178,94 @@ impl<'a> Grid<'a> {
         lattices: &[Lattice],
         candidates: &[Candidate],
     ) -> Result<(Identified, Facts)> {
-        let nothing = |outcome| Ok((self.identified(self.plate.clone(), Board::new(), outcome)?, Facts::default()));
+        let nothing = |outcome, facts| Ok((self.identified(self.plate.clone(), Board::new(), outcome)?, facts));
         let Some(lattice) = lattices.first() else {
-            return nothing(if candidates.is_empty() { Outcome::NoCandidates } else { Outcome::NoLattice });
+            let outcome = if candidates.is_empty() { Outcome::NoCandidates } else { Outcome::NoLattice };
+            return nothing(outcome, Facts::default());
         };
-        let told = self.told();
-        let dots = if told == Told::Equal { Dots::alike(lattice, candidates) } else { Dots::of(lattice, candidates) };
-        let Some(mut dots) = dots else { return nothing(Outcome::Ambiguous) };
-        if told == Told::Nothing {
-            dots.leave_out_uneven_light(lattice, candidates);
-        }
-        let plate = match told {
-            Told::Radii => self.plate.clone(),
-            Told::Places => self.with_large(&dots, |marker| self.plate.large.contains(&self.plate.markers[marker].id)),
-            Told::Equal | Told::Nothing => self.with_large(&dots, |_| false),
-        };
-        if !self.agrees(&dots) || (told == Told::Places && dots.other.is_empty()) {
-            return nothing(Outcome::Ambiguous);
-        }
+        let (told, view) = (self.told(), View { picture, lattice, candidates });
+        let Some(mut dots) = self.dots(told, &view) else { return nothing(Outcome::Ambiguous, Facts::default()) };
+        let plate = self.unturned(told, &dots);
         let code = self.code(&plate)?;
         let classes = match told {
             Told::Radii | Told::Places => code.classes_of(lattice, candidates),
             Told::Equal | Told::Nothing => all_alike(lattice),
         };
         let (mut laid, outcome) = place(&code, &self.cells, &classes);
-        let view = View { picture, lattice, candidates };
-        let shape = view.shape();
-        let mut facts = Facts { cut: shape.is_some_and(|(_, in_view)| !in_view), ..Facts::default() };
-        let shape = shape.filter(|(_, in_view)| *in_view).map(|(shape, _)| shape);
-        facts.size = shape.and_then(Shape::columns_and_rows);
-        facts.other_size = self.other_size(shape, lattice, laid.first(), outcome);
+        let mut facts = self.outlined(&view, laid.first(), outcome);
         if facts.other_size.is_some() {
-            return Ok((self.identified(self.plate.clone(), Board::new(), Outcome::Ambiguous)?, facts));
+            return nothing(Outcome::Ambiguous, facts);
         }
         let outline_tells = laid.len() == 1;
-        if let (Told::Nothing, Some(any)) = (told, laid.first()) {
-            dots.add(missing_dots(picture, lattice, candidates, (any, &self.cells), &dots.usual));
-            dots.leave_out_uneven_light(lattice, candidates);
-            let first = laid.iter().map(|l| others(l, &dots)).min();
-            laid.retain(|l| first.as_ref() == Some(&others(l, &dots)));
+        if told == Told::Nothing {
+            self.turn_by_dots(&mut laid, &mut dots, &view);
         }
         let Some(chosen) = laid.iter().min_by(|a, b| a.lean(lattice).total_cmp(&b.lean(lattice))) else {
-            return Ok((self.identified(self.plate.clone(), Board::new(), outcome)?, facts));
+            return nothing(outcome, facts);
         };
-        let plate = match told {
-            Told::Radii | Told::Places | Told::Equal => plate,
-            Told::Nothing => self.with_found(&dots, chosen),
-        };
+        let plate = if told == Told::Nothing { self.with_found(&dots, chosen) } else { plate };
         let elsewhere = others(chosen, &dots);
         if laid.len() > 1 && self.contradicts(&plate, &elsewhere) {
             return Err(dots_elsewhere(&elsewhere));
         }
         // Dots that tell the turn are seen as other than they are.
         if laid.iter().any(|other| chosen.is_told_from(other, &code, &self.cells)) {
-            return nothing(Outcome::Ambiguous);
+            return nothing(Outcome::Ambiguous, Facts::default());
         }
         let classes = match told {
             Told::Equal => all_alike(lattice),
             Told::Radii | Told::Places | Told::Nothing => self.code(&plate)?.classes_of(lattice, candidates),
         };
-        let board = board(chosen, lattice, &classes);
         let sizes = match told {
             Told::Radii | Told::Equal => Sizes::default(),
             Told::Places | Told::Nothing => self.sizes(&plate, &dots),
         };
         facts.sizes = if outline_tells { Sizes { large: Vec::new(), ..sizes } } else { sizes };
         facts.symmetric = laid.len() > 1;
-        if let Some(larger) = Some(told).filter(|t| *t == Told::Equal).and_then(|_| Dots::larger(lattice, candidates)) {
-            let here = others(chosen, &larger);
-            facts.unstated = if laid.iter().all(|l| others(l, &larger) == here) { Vec::new() } else { here };
-        }
+        facts.unstated = if told == Told::Equal { larger_dots(&laid, chosen, &view) } else { Vec::new() };
         facts.outer = self.outer(&view, chosen);
         let size_of = |lattice| View { picture, lattice, candidates }.shape()?.0.columns_and_rows();
         facts.has_twin = lattices.get(1).and_then(size_of).is_some_and(|size| facts.size == Some(size));
-        Ok((self.identified(plate, board, outcome)?, facts))
+        Ok((self.identified(plate, board(chosen, lattice, &classes), outcome)?, facts))
+    }
+
+    /// The dots of a lattice; `None` where they are not of the sizes that the plate tells.
+    fn dots(&self, told: Told, view: &View) -> Option<Dots> {
+        let of = if told == Told::Equal { Dots::alike } else { Dots::of };
+        let mut dots = of(view.lattice, view.candidates)?;
+        if told == Told::Nothing {
+            dots.leave_out_uneven_light(view.lattice, view.candidates);
+        }
+        let are_told = told != Told::Places || !dots.other.is_empty();
+        (are_told && self.agrees(&dots)).then_some(dots)
+    }
+
+    /// The plate with the radii that are known before it is known how it is turned.
+    fn unturned(&self, told: Told, dots: &Dots) -> Plate {
+        match told {
+            Told::Radii => self.plate.clone(),
+            Told::Places => self.with_large(dots, |marker| self.plate.large.contains(&self.plate.markers[marker].id)),
+            Told::Equal | Told::Nothing => self.with_large(dots, |_| false),
+        }
+    }
+
+    /// What the outline of a lattice tells that lies on the plate as `laid` says, or nowhere.
+    fn outlined(&self, view: &View, laid: Option<&Laid>, outcome: Outcome) -> Facts {
+        let shape = view.shape();
+        let cut = shape.is_some_and(|(_, in_view)| !in_view);
+        let shape = shape.filter(|(_, in_view)| *in_view).map(|(shape, _)| shape);
+        let other_size = self.other_size(shape, view.lattice, laid, outcome);
+        Facts { cut, size: shape.and_then(Shape::columns_and_rows), other_size, ..Facts::default() }
+    }
+
+    /// Keeps the turns in which the dots that are not as most are, those that are missing among them, have the least places.
+    fn turn_by_dots(&self, laid: &mut Vec<Laid>, dots: &mut Dots, view: &View) {
+        let View { picture, lattice, candidates } = *view;
+        let Some(any) = laid.first() else { return };
+        dots.add(missing_dots(picture, lattice, candidates, (any, &self.cells), &dots.usual));
+        dots.leave_out_uneven_light(lattice, candidates);
+        let first = laid.iter().map(|l| others(l, dots)).min();
+        laid.retain(|l| first.as_ref() == Some(&others(l, dots)));
     }
 
     /// Why the dots are not those of the plate by their number, where they lie on it as `laid` says, or nowhere.
@@ -367,6 +381,13 @@ fn others(laid: &Laid, dots: &Dots) -> Vec<(i32, i32)> {
     let mut all: Vec<(i32, i32)> = dots.other.keys().map(|c| laid.apply(*c)).map(|(i, j)| (j, i)).collect();
     all.sort_unstable();
     all
+}
+
+/// Places on the grid of larger dots, where they would tell how it is turned.
+fn larger_dots(laid: &[Laid], chosen: &Laid, view: &View) -> Vec<(i32, i32)> {
+    let Some(larger) = Dots::larger(view.lattice, view.candidates) else { return Vec::new() };
+    let here = others(chosen, &larger);
+    if laid.iter().all(|l| others(l, &larger) == here) { Vec::new() } else { here }
 }
 
 /// Every dot is of the only class.
