@@ -1,5 +1,7 @@
 //! Joint states of two publishers in one topic: readings that go to and fro as no joint does.
 
+use std::ops::Range;
+
 use super::motion::WINDOW_NS;
 use super::samples::JointSample;
 use crate::error::{Code, Error, Result};
@@ -10,8 +12,14 @@ const MOST_AWAY: usize = 3;
 const LONGEST_NS: i64 = 250_000_000;
 /// It is back where no more than this share of the way is left.
 const BACK: f64 = 0.1;
-/// What goes to and fro by less than this share of all that the joint moves is noise, whatever the unit.
+/// What goes to and fro by less than this share of all that the joint moves may be noise, whatever the unit.
 const LEAST_OF_RANGE: f64 = 5e-4;
+/// It is none where the joint stands and reads one of two positions, each to within this share of their distance.
+const CLEAR: f64 = 0.2;
+/// Two positions at one stamp that differ by less than this share of what a joint that stands may move are one, rounded.
+const LEAST_OF_STILL: f64 = 0.02;
+/// They are of two where they are told apart at one in so many of the stamps at which the joint stands.
+const ONE_IN: usize = 10;
 /// Or by less than so many of the smallest steps of its readings, but no more than so many times what a joint that stands may move.
 const LEAST_STEPS: f64 = 5.0;
 const MOST_STILL: f64 = 10.0;
@@ -53,13 +61,14 @@ pub(super) fn require_one(
     let mut most: Option<(&String, Vec<Pair>)> = None;
     for (joint, still_speed) in joints.iter().zip(still_speeds) {
         let readings = readings(samples, joint);
-        let Found { pairs, standing } = to_and_fro(&readings, still_speed * 2e-9 * WINDOW_NS as f64);
-        let (is_often, pairs) = (is_often(&readings, pairs.len()), standing);
-        if is_often
-            && pairs.len() >= LEAST_STANDING
-            && most.as_ref().is_none_or(|(_, others)| pairs.len() > others.len())
-        {
-            most = Some((joint, pairs));
+        let still = still_speed * 2e-9 * WINDOW_NS as f64;
+        for Found { pairs, standing } in [to_and_fro(&readings, still), at_one_stamp(&readings, still)] {
+            if is_often(&readings, pairs.len())
+                && standing.len() >= LEAST_STANDING
+                && most.as_ref().is_none_or(|(_, others)| standing.len() > others.len())
+            {
+                most = Some((joint, standing));
+            }
         }
     }
     let Some((joint, pairs)) = most else { return Ok(()) };
@@ -97,16 +106,24 @@ fn to_and_fro<'a>(readings: &[Reading<'a>], still: f64) -> Found<'a> {
     let steps = readings.windows(2).map(|w| (w[1].position - w[0].position).abs());
     let smallest = steps.filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min);
     let (low, high) = range(readings.iter());
-    let least = still.max(LEAST_OF_RANGE * (high - low)).max((LEAST_STEPS * smallest).min(MOST_STILL * still));
+    let beyond_noise = still.max(LEAST_OF_RANGE * (high - low)).max((LEAST_STEPS * smallest).min(MOST_STILL * still));
+    // Steps of either publisher by itself are those between readings that are not neighbours.
+    let apart = |by: usize| readings.iter().zip(readings.iter().skip(by)).map(|(a, b)| (b.position - a.position).abs());
+    let digit = (1..=MOST_AWAY + 1).flat_map(apart).filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min);
+    let least = still.max(LEAST_STEPS * digit).min(beyond_noise);
+    let bound = |from: usize, steps: usize| match is_back(readings, from, steps, beyond_noise) {
+        true => Some(beyond_noise),
+        false => (is_back(readings, from, steps, least) && is_clear(readings, from)).then_some(least),
+    };
     let mut found = Found::default();
     let mut from = 0;
     while from < readings.len() {
-        match (2..=MOST_AWAY + 1).find(|steps| is_back(readings, from, *steps, least)) {
-            Some(steps) => {
+        match (2..=MOST_AWAY + 1).find_map(|steps| Some((steps, bound(from, steps)?))) {
+            Some((steps, bound)) => {
                 let pair = [readings[from], readings[from + 1]];
                 let pair = found.pairs.last().map_or(pair, |before| oriented(pair, before));
                 found.pairs.push(pair);
-                if stands(readings, from, least) || stands(readings, from + 1, least) {
+                if stands(readings, from, bound) || stands(readings, from + 1, bound) {
                     found.standing.push(pair);
                 }
                 from += steps;
@@ -117,20 +134,53 @@ fn to_and_fro<'a>(readings: &[Reading<'a>], still: f64) -> Found<'a> {
     found
 }
 
+/// The readings for a while before and behind one, so many at least to either side where there are.
+fn around(readings: &[Reading], at: usize, least: usize) -> Range<usize> {
+    let time_ns = readings[at].time_ns;
+    let is_near = |reading: &&Reading| reading.time_ns.abs_diff(time_ns) <= STANDS_NS;
+    let before = readings[..at].iter().rev().take_while(is_near).count().max(least.min(at));
+    let behind = &readings[at + 1..];
+    let behind = behind.iter().take_while(is_near).count().max(least.min(behind.len()));
+    at - before..at + 1 + behind
+}
+
 /// Whether a reading was there for a while before, and is for a while behind.
 fn stands(readings: &[Reading], at: usize, least: f64) -> bool {
-    let left = &readings[at];
-    let goes_on = |beside: &mut dyn Iterator<Item = &Reading>| {
-        let mut others = 0;
-        let near = |(k, reading): &(usize, &Reading)| {
-            *k < STANDS_READINGS || reading.time_ns.abs_diff(left.time_ns) <= STANDS_NS
-        };
-        beside.enumerate().take_while(near).all(|(_, reading)| {
-            others = if (reading.position - left.position).abs() < least { 0 } else { others + 1 };
-            others <= MOST_AWAY
-        })
+    let (near, position) = (around(readings, at, STANDS_READINGS), readings[at].position);
+    let is_other = |reading: &Reading| (reading.position - position).abs() >= least;
+    let goes_on = |beside: &[Reading]| {
+        let mut runs = beside.chunk_by(|a, b| is_other(a) == is_other(b));
+        runs.all(|run| run.len() <= MOST_AWAY || !is_other(&run[0]))
     };
-    goes_on(&mut readings[..at].iter().rev()) && goes_on(&mut readings[at + 1..].iter())
+    goes_on(&readings[near.start..at]) && goes_on(&readings[at + 1..near.end])
+}
+
+/// Whether all that is read for a while about a reading is what it reads, or what the next one does.
+fn is_clear(readings: &[Reading], from: usize) -> bool {
+    let [left, away] = [from, from + 1].map(|k| readings[k].position);
+    let bound = CLEAR * (away - left).abs();
+    let is_one = |reading: &Reading| [left, away].iter().any(|own| (reading.position - own).abs() <= bound);
+    readings[around(readings, from, STANDS_READINGS)].iter().all(is_one)
+}
+
+/// Two readings at one stamp, the lower first, where the joint stands at both and they differ by more than each of them scatters.
+fn at_one_stamp<'a>(readings: &[Reading<'a>], still: f64) -> Found<'a> {
+    let two = |at_stamp: &[Reading<'a>]| match *at_stamp {
+        [a, b] => Some(if a.position <= b.position { [a, b] } else { [b, a] }),
+        _ => None,
+    };
+    let pairs: Vec<Pair> = readings.chunk_by(|a, b| a.time_ns == b.time_ns).filter_map(two).collect();
+    let lower: Vec<Reading> = pairs.iter().map(|pair| pair[0]).collect();
+    let stays = |at: usize, bound: f64| {
+        let near = &pairs[around(&lower, at, MOST_AWAY + 1)];
+        near.iter().all(|pair| (0..2).all(|k| (pair[k].position - pairs[at][k].position).abs() <= bound))
+    };
+    let way = |at: usize| pairs[at][1].position - pairs[at][0].position;
+    let standing: Vec<usize> = (0..pairs.len()).filter(|&at| stays(at, still)).collect();
+    let is_apart = |at: &usize| way(*at) >= LEAST_OF_STILL * still && stays(*at, CLEAR * way(*at));
+    let apart: Vec<Pair> = standing.iter().copied().filter(is_apart).map(|at| pairs[at]).collect();
+    let apart = if ONE_IN * apart.len() >= standing.len() { apart } else { Vec::new() };
+    Found { pairs: apart.clone(), standing: apart }
 }
 
 /// Whether a reading that was there before is left at once, and back after so many steps. A joint that turns back comes from further away.
@@ -271,6 +321,36 @@ mod tests {
             let others = (0..20_000 / every_ms).map(|k| (k * every_ms + every_ms / 2) * MS);
             let all: Vec<JointSample> = own.chain(others.map(|t| sample(t, late(t), "relay"))).collect();
             assert!(refused(&all).is_none(), "every {every_ms} ms, {late_ms} ms late");
+        }
+    }
+
+    /// What is commanded beside what is reached, closer than a share of the range of the joint: of one stamp, and a little later.
+    #[test]
+    fn two_publishers_that_nearly_agree_are_told_where_the_joint_stands() {
+        let noise = |k: i64| 2e-5 * ((k * 7919) % 11 - 5) as f64 / 5.0;
+        let both = |every_ms: i64, late_ms: i64, apart: f64| {
+            let own = (0..20_000 / every_ms).map(|k| (k, k * every_ms * MS));
+            let two = |(k, t): (i64, i64)| {
+                let (own, other) = (20.0 * position(t), 20.0 * position(t + late_ms * MS) + apart);
+                [sample(t, own + noise(k), "arm"), sample(t + late_ms * MS, other + noise(k + 3), "arm")]
+            };
+            own.flat_map(two).collect::<Vec<_>>()
+        };
+        let code = |samples: &[JointSample]| refused(samples).map(|error| error.code);
+        for (every_ms, late_ms, apart) in
+            [(20, 0, 1.8e-3), (20, 0, -3e-4), (100, 0, 1e-3), (4, 0, 1e-3), (20, 6, 1.8e-3)]
+        {
+            let samples = both(every_ms, late_ms, apart);
+            assert_eq!(code(&samples), Some(Code::JointStatesOfTwo), "{every_ms} {late_ms} {apart}");
+        }
+        // The same again, with other digits, and with the noise of a reading of its own; two readings of one publisher at every stamp.
+        for apart in [0.0, 1e-7] {
+            assert_eq!(code(&both(20, 0, apart)), None, "{apart}");
+        }
+        for digit in [1e-3, 1e-5] {
+            let at = |k: i64| position(k / 2 * 20 * MS) + digit * ((k * k * 7919 / 13) % 3) as f64;
+            let coarse = (0..2000).map(|k| sample(k / 2 * 20 * MS, at(k), "arm")).collect::<Vec<_>>();
+            assert_eq!(code(&coarse), None, "{digit}");
         }
     }
 
