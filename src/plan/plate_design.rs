@@ -132,7 +132,7 @@ impl Sheet {
 
     /// The smallest A sheet that holds `plate` with its quiet zone and strips; without one, a sheet of just that size.
     pub fn fitting(plate: &Plate) -> Self {
-        let [width, height] = needed_size(plate.columns, plate.rows, plate.pitch_m, widest_radius(plate));
+        let [width, height] = with_strips(quiet_field_m(plate));
         let fits = |paper: &&(&str, f64, f64)| {
             let (short, long) = (paper.1 / 1e3, paper.2 / 1e3);
             width.min(height) <= short && width.max(height) <= long
@@ -145,11 +145,11 @@ impl Sheet {
     }
 }
 
-/// Half of the plate's printed field beyond the outermost marker centres, m (a whole square for a chessboard).
+/// The plate's printed field beyond the outermost markers, m (a whole square for a chessboard).
 fn widest_radius(plate: &Plate) -> f64 {
     match plate.kind.print().ink {
         Ink::Squares | Ink::SquaresAndTags | Ink::SquaresAndDots => plate.pitch_m,
-        Ink::Tags => plate.tags.as_ref().map_or(0.0, |tags| tags.side_m / 2.0 + tags.gap_m),
+        Ink::Tags => plate.tags.as_ref().map_or(0.0, |tags| tags.gap_m),
         Ink::Circles | Ink::Unknown => plate.markers.iter().fold(0.0, |r, m| m.outer_radius_m.max(r)),
     }
 }
@@ -157,15 +157,17 @@ fn widest_radius(plate: &Plate) -> f64 {
 /// Half width and half height of the field that must stay free of everything but markers, m.
 pub fn quiet_field_m(plate: &Plate) -> [f64; 2] {
     let beyond = widest_radius(plate) + plate.pitch_m;
-    [plate.columns, plate.rows].map(|n| (f64::from(n) - 1.0) / 2.0 * plate.pitch_m + beyond)
+    let furthest = |axis: usize| plate.markers.iter().fold(0.0, |far: f64, m| far.max(m.position_m[axis].abs()));
+    [furthest(0) + beyond, furthest(1) + beyond]
 }
 
 fn needed_size(columns: u32, rows: u32, pitch_m: f64, radius_m: f64) -> [f64; 2] {
-    let beyond = 2.0 * (radius_m + pitch_m);
-    [
-        (f64::from(columns) - 1.0) * pitch_m + beyond + 2.0 * SIDE_STRIP_M,
-        (f64::from(rows) - 1.0) * pitch_m + beyond + 2.0 * TEXT_STRIP_M,
-    ]
+    with_strips([columns, rows].map(|n| (f64::from(n) - 1.0) / 2.0 * pitch_m + radius_m + pitch_m))
+}
+
+/// Width and height of the sheet about a quiet field of half this size, m.
+fn with_strips([width_m, height_m]: [f64; 2]) -> [f64; 2] {
+    [2.0 * (width_m + SIDE_STRIP_M), 2.0 * (height_m + TEXT_STRIP_M)]
 }
 
 /// Designs a plate.

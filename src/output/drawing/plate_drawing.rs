@@ -127,6 +127,8 @@ fn text(at: [f64; 2], text: &str, all: &mut Vec<Figure>) {
 mod tests {
     use super::*;
     use crate::plan::plate_design::{PlateRequest, design};
+    use crate::series::parse_plate;
+    use std::path::Path;
 
     fn small() -> (Plate, Caption) {
         let made = design(&PlateRequest { shape: Some((9, 7)), ..PlateRequest::default() }).unwrap();
@@ -157,6 +159,38 @@ mod tests {
                 assert!(corners.iter().all(|p| !in_field(p)), "{shape:?} {corners:?}");
                 assert!(corners.iter().all(on_sheet), "{shape:?} {corners:?} {:?}", made.sheet);
             }
+        }
+    }
+
+    /// Rows of an asymmetric grid are twice as long as their dots are many.
+    #[test]
+    fn an_asymmetric_grid_lies_on_its_sheet_with_all_else_beside_it() {
+        for (columns, rows, pitch_m) in [(4, 11, 0.02), (4, 7, 0.02), (6, 11, 0.02), (10, 5, 0.015)] {
+            let toml = format!(
+                "format = 1\nkind = \"circle-grid\"\ncolumns = {columns}\nrows = {rows}\npitch_m = {pitch_m}\nasymmetric = true\nradius_m = 0.004\n"
+            );
+            let plate = parse_plate(Path::new("plate.toml"), &toml, "").unwrap();
+            let sheet = Sheet::fitting(&plate);
+            let half = [sheet.width_m / 2.0, sheet.height_m / 2.0];
+            let mut dots = Vec::new();
+            let mut beside = Vec::new();
+            for figure in figures(&plate, &Caption { name: "dots".to_owned(), sheet }) {
+                match figure {
+                    Figure::Ring { centre, outer, .. } => {
+                        assert!((0..2).all(|k| centre[k].abs() + outer + pitch_m <= half[k]), "{columns} {centre:?}");
+                        dots.push(centre);
+                    }
+                    Figure::Polygon(corners) => beside.extend(corners),
+                    Figure::Line { from, to, .. } => beside.extend([from, to]),
+                    Figure::Text { at, .. } => beside.push(at),
+                    Figure::Region(_) => {}
+                }
+            }
+            assert_eq!(dots.len(), columns * rows);
+            let nearest =
+                |p: &[f64; 2]| dots.iter().map(|c| (c[0] - p[0]).hypot(c[1] - p[1])).fold(f64::INFINITY, f64::min);
+            assert!(beside.iter().all(|p| nearest(p) > pitch_m), "{columns} x {rows}");
+            assert!(beside.iter().all(|p| (0..2).all(|k| p[k].abs() <= half[k])), "{columns} x {rows}");
         }
     }
 
