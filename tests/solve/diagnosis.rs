@@ -8,7 +8,7 @@ use robotcal::geom::Pose;
 use robotcal::identify::{JointNoise, Options, RobotModel, identify};
 use robotcal::problem::{BodySeen, ImageRejection, InstrumentKind, MeasuredSeries, MeasuredStop, SeenBody};
 use robotcal::series::{CameraMount, Plate, PlateKind};
-use robotcal::simulate::{WorldRequest, series};
+use robotcal::simulate::{RobotErrors, WorldRequest, series};
 use robotcal::study::measured;
 use robotcal::urdf::Chain;
 use robotcal::{Code, Error};
@@ -390,4 +390,45 @@ fn other_numberings_of_a_grid_are_named() {
     let refused = said(MeasuredSeries { plate: lattice(columns + 1, rows + 1), ..seen });
     assert_eq!(refused.code, Code::PlateContradicted, "{refused}");
     assert_eq!((number(&refused, "columns"), number(&refused, "rows")), (11.0, 8.0), "{refused}");
+}
+
+/// The eleven stops whose first three joints are most alike, and behind them the stop that is furthest from these.
+fn alike_and_one_afar(world: MeasuredSeries) -> MeasuredSeries {
+    let apart = |a: &MeasuredStop, b: &MeasuredStop| {
+        let (a, b) = (a.readings.as_ref().unwrap(), b.readings.as_ref().unwrap());
+        a.iter().zip(b).take(3).map(|(p, q)| (p - q).abs()).fold(0.0, f64::max)
+    };
+    let by_distance = |from: &MeasuredStop| {
+        let mut order: Vec<usize> = (0..world.stops.len()).collect();
+        order.sort_by(|a, b| apart(from, &world.stops[*a]).total_cmp(&apart(from, &world.stops[*b])));
+        order
+    };
+    let orders = world.stops.iter().map(|from| (from, by_distance(from)));
+    let reach = |(from, order): &(&MeasuredStop, Vec<usize>)| apart(from, &world.stops[order[10]]);
+    let (_, order) = orders.min_by(|a, b| reach(a).total_cmp(&reach(b))).unwrap();
+    let kept = order[..11].iter().chain(order.last()).map(|&k| world.stops[k].clone()).collect();
+    MeasuredSeries { stops: kept, ..world.clone() }
+}
+
+/// Stops in one posture tell little of where the robot is in another: an image there that misses by what the fit expects is none of other readings.
+#[test]
+fn the_only_image_in_another_posture_is_judged_by_what_is_known_there() {
+    let mut chain = kr6();
+    chain.joints.iter_mut().for_each(|joint| joint.origin.translation *= 3.0);
+    let errors = RobotErrors { terms: RobotErrors::default().terms, ..RobotErrors::of_priors() };
+    let wrong_pairs = |series: MeasuredSeries| {
+        let solution = identify(chain.clone(), &[series], &Options::default()).unwrap();
+        let images = solution.fit.problem.images.iter().filter(|image| image.rejected.is_some());
+        images.map(|image| image.name.clone()).collect::<Vec<_>>()
+    };
+    for seed in [5, 6, 7, 8] {
+        let request = WorldRequest { images: 300, errors, seed, ..request(&chain) };
+        let series = alike_and_one_afar(measured(&series(&request).unwrap(), &chain));
+        assert_eq!(wrong_pairs(series.clone()), [""; 0], "{seed}");
+        let mut wrong = series;
+        let afar = wrong.stops.last_mut().unwrap();
+        afar.readings.as_mut().unwrap()[0] += 0.2;
+        let name = afar.image.clone();
+        assert_eq!(wrong_pairs(wrong), [name], "{seed}");
+    }
 }

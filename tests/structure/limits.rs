@@ -158,6 +158,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/poses/stand_alone.rs MOST_TOGETHER", "how many are written"),
     ("identify/two_stage/staged.rs VARIED", "step of a derivative"),
     ("identify/start/robot.rs COMPARED", "how many starts are compared"),
+    ("identify/start/robot.rs SQUARES_OF_POSE", "quantile of chi-squared"),
     ("identify/mistakes/suspects.rs ENOUGH", "samples of a median"),
     ("identify/bodies/touch_mistakes.rs FITTED", "starts of a search"),
     ("identify/bodies/touch_mistakes.rs NAMED", "how many are named"),

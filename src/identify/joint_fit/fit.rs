@@ -229,7 +229,7 @@ fn fit(
         None => estimate_components_from_above(start, &components),
     };
     for _ in 0..ROUNDS {
-        let images = take_back(&mut outcome.adjustment, free, aside, &options.limits);
+        let images = take_back(&mut outcome, free, aside, &options.limits);
         if !take_bodies_back(&mut outcome.adjustment, &options.limits) && !images {
             break;
         }

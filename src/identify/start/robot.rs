@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Matrix6;
+
 use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, ReadingRatio, RowsOf};
 use crate::error::{Code, Error, Quantity, Result};
@@ -22,6 +24,7 @@ use crate::model::robot::Robot;
 use crate::problem::{
     Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
 };
+use crate::solve::{Covariance, Outcome};
 use crate::urdf::BASE_FROM_BASE;
 
 /// Closed forms whose pixel cost is compared.
@@ -417,17 +420,51 @@ pub(in crate::identify) fn usual_misfit(adjustment: &Adjustment, free: &FreePose
     median(of_used)
 }
 
-/// Takes images back that were set `aside` with the nominal robot, and fit the robot that was found as the others do. True where there are some.
+/// Square of three sigmas of six components: the quantile of chi-squared at 0.9973.
+const SQUARES_OF_POSE: f64 = 20.06;
+
+/// Squares of the misfit of an image by the covariance of the fit in use (robot, hand-eye transform and plate), of its stand-alone pose, and of
+/// the noise of its readings.
+fn squares(adjustment: &Adjustment, free: &FreePoses, covariance: &Covariance, image: usize) -> Option<f64> {
+    let Adjustment { problem, state } = adjustment;
+    let (own, tie, seen) = (&problem.images[image], &state.ties[image], free.poses[image].as_ref()?);
+    let stop = &problem.stops[own.stop];
+    let errors = vec![0.0; state.joint_errors[own.stop].len()];
+    let from = TakenFrom { posture: Some(problem.posture(image)?), joint_errors: &errors, tie };
+    let predicted = state.chained(&problem.layout, own, from)?;
+    let of_joints = (0..errors.len()).map(|r| problem.joint_error_variance(stop, r).iter().sum::<f64>());
+    let of_tie = (0..tie.len()).map(|k| problem.displacement_variance(own, k));
+    let mut latent = predicted.d_latent.clone();
+    latent.column_iter_mut().zip(of_joints.chain(of_tie)).for_each(|(mut by, variance)| by *= variance);
+    let (g, theta) = (&predicted.d_theta, problem.layout.theta_len());
+    let by_fit = g * covariance.reduced.view((0, 0), (theta, theta)) * g.transpose();
+    let all = by_fit + latent * predicted.d_latent.transpose();
+    let all = Matrix6::from_column_slice(all.as_slice()) + seen.covariance;
+    let apart = (predicted.pose.inverse() * seen.camera_from_plate).log();
+    Some(apart.dot(&all.cholesky()?.solve(&apart)))
+}
+
+/// Takes images back that were set `aside` with the nominal robot, and fit the robot that was found as the others do, or as well as it is known
+/// where they were taken. True where there are some.
 pub(in crate::identify) fn take_back(
-    adjustment: &mut Adjustment,
+    outcome: &mut Outcome,
     free: &FreePoses,
     aside: &[usize],
     limits: &Limits,
 ) -> bool {
+    let adjustment = &outcome.adjustment;
     let Some(usual) = usual_misfit(adjustment, free) else { return false };
     let fits = |i: &usize| misfit(adjustment, free, *i).is_some_and(|s| s < limits.set_aside_factor * usual);
-    let is_out = |i: &usize| adjustment.problem.images[*i].rejected.is_some();
-    let back: Vec<usize> = aside.iter().copied().filter(|i| is_out(i) && fits(i)).collect();
-    back.iter().for_each(|&i| adjustment.problem.images[i].rejected = None);
+    let out: Vec<usize> = aside.iter().copied().filter(|&i| adjustment.problem.images[i].rejected.is_some()).collect();
+    let mut back: Vec<usize> = out.iter().copied().filter(fits).collect();
+    if back.is_empty() && !out.is_empty() {
+        let covariance = outcome.linear().and_then(|linear| linear.covariance().ok());
+        let is_predicted = |i: &usize| {
+            let squares = covariance.as_ref().and_then(|known| squares(adjustment, free, known, *i));
+            squares.is_some_and(|squares| squares < SQUARES_OF_POSE)
+        };
+        back = out.into_iter().filter(is_predicted).collect();
+    }
+    back.iter().for_each(|&i| outcome.adjustment.problem.images[i].rejected = None);
     !back.is_empty()
 }
