@@ -189,3 +189,35 @@ fn an_arm_that_carries_the_plate_sags_as_by_itself() {
         }
     }
 }
+
+/// A parallelogram: the third joint turns back by what the second turns, and reads nothing of its own.
+#[test]
+fn gravity_of_a_joint_that_another_mimics_is_that_of_the_last_of_them() {
+    let joint = |name: &str, parent: &str, more: &str| {
+        format!(
+            r#"<link name="{name}_link"/><joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{name}_link"/>
+            <origin xyz="0.3 0.02 0.1" rpy="0.1 0 0.2"/><axis xyz="0 1 0"/>{more}<limit lower="-3" upper="3" effort="0" velocity="1"/></joint>"#
+        )
+    };
+    let joints = [
+        joint("a", "root", ""),
+        joint("b", "a_link", ""),
+        joint("p", "b_link", r#"<mimic joint="b" multiplier="-1"/>"#),
+        joint("c", "p_link", ""),
+    ];
+    let text = format!(r#"<robot name="parallel"><link name="root"/>{}</robot>"#, joints.concat());
+    let chain = RobotDescription::from_text(Path::new("parallel.urdf"), text).unwrap().chain(None, None).unwrap();
+    let (q, value) = ([0.4, -0.9, 0.7], 1e-2);
+    let poses = Robot::nominal(chain.clone()).link_poses(&q);
+    let [p, c] = [2, 3].map(|k: usize| poses[k].rotation);
+    let axis = p * chain.joints[2].axis;
+    // The levers of an axis along y are x and -z.
+    let levers = [p.column(0).into_owned(), -p.column(2), c.column(0).into_owned(), -c.column(2)];
+    for (lever, arm) in (0..4).zip(levers) {
+        let terms = vec![JointTerm { reading: 1, term: Term::Gravity(lever), value }];
+        let sagging = Robot { terms, ..Robot::nominal(chain.clone()) }.base_from_tip(&q);
+        let moment = axis.dot(&arm.cross(&nalgebra::Vector3::new(0.0, 0.0, -1.0)));
+        let expected = Robot::nominal(chain.clone()).base_from_tip(&[q[0], q[1] + value * moment, q[2]]);
+        assert!((sagging.matrix() - expected.matrix()).amax() < 1e-12, "lever {lever}");
+    }
+}

@@ -301,7 +301,7 @@ fn problems(mount: CameraMount, deviation: f64, dice: &mut Dice) -> Vec<(Problem
     chains()
         .into_iter()
         .map(|parts| {
-            // Gravity of a reading that moves several joints is defined by the first of them; it has its own test.
+            // Gravity of a reading that moves several joints is defined by the last of them; it has its own test.
             let mimic = parts.iter().any(|p| matches!(p, Part::Mimic(_)));
             let mut terms = all_terms();
             terms.retain(|t| !(mimic && matches!(t, Term::Gravity(_) | Term::Sag)));

@@ -6,7 +6,8 @@ use super::joint_error::{Exported, GRAVITY_TERMS, JointError, TermContext};
 use super::robot_model::RobotModel;
 use crate::urdf::Chain;
 
-/// Levers 0 and 1 are fixed in the joint's own link, 2 and 3 in the link after the next moving joint.
+/// Levers 0 and 1 are fixed in the joint's own link, 2 and 3 in the link after the next moving joint. Of a joint that others mimic, axis and
+/// link are those of the last of them in the chain.
 pub(super) struct Gravity;
 
 impl JointError for Gravity {
@@ -21,6 +22,7 @@ impl JointError for Gravity {
         "gravity in rad (m for a prismatic joint).",
         "m_1, m_2: moment about the axis of a unit weight (along -z of the root) at unit levers u and axis x u of the joint's own link;",
         "m_3, m_4: the same about this axis for levers u' and axis' x u' of the link after the next moving joint.",
+        "Of a joint that others mimic, axis and own link are those of the last of them from base to tip; the next joint moves behind that one.",
         "u is the unit vector along x (along y where |axis_x| >= 0.9) without its part along the axis.",
     ];
 

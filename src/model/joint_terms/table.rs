@@ -147,7 +147,8 @@ joint_terms! {
     ]
     [
         /// Sag under gravity: the moment about the axis of a unit weight on a unit lever. Levers 0 and 1 are fixed in the
-        /// joint's own link, levers 2 and 3 in the link after the next moving joint of the chain.
+        /// joint's own link, levers 2 and 3 in the link after the next moving joint of the chain. Of a joint that others mimic, the
+        /// last of them counts.
         Gravity(lever: u8)
     ]
     [
