@@ -62,10 +62,10 @@ impl Kind for ZeroOff {
         };
         match (self.is_reversed, self.offset_is_told) {
             (true, true) => format!(
-                "counts the other way, and its zero is {size:+.1} {unit} from that of the URDF, by the images; the corrected URDF has it"
+                "counts the other way, and its zero is {size:+.1} {unit} from that of the URDF, by the images; the corrected URDF has it, or mastering.csv where it has in_urdf = no"
             ),
             (false, true) => {
-                format!("its zero is {size:+.1} {unit} from that of the URDF, by the images; the corrected URDF has it")
+                format!("its zero is {size:+.1} {unit} from that of the URDF, by the images; the corrected URDF has it, or mastering.csv where it has in_urdf = no")
             }
             (true, false) => "counts the other way, by the images, and does so in the corrected URDF; where its zero is they do not tell, as another one turns base or hand alone".into(),
             (false, false) => "its zero is not that of the URDF; where it is the images do not tell, as another one turns base or hand alone".into(),

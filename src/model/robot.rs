@@ -1,6 +1,6 @@
 //! The robot: `base_from_tip(q) = prod_i [ origin_i Exp(xi_i) Motion_i(qt_i) ]` and its derivatives.
 
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
 use super::joint_terms::{GRAVITY_TERMS, JointTerm, RobotModel, Term, TermContext, USUAL_HARMONICS, levers};
 use crate::geom::{Pose, adjoint, right_jacobian_se3};
@@ -215,29 +215,64 @@ impl Robot {
         Self { terms, ..Self::nominal(chain) }
     }
 
-    /// What a controller has to add to every reading so that no offset is left, rad or m.
+    /// What a controller has to add to every reading so that no offset is left, be it a term or in the origins since before the fit, rad or m.
     pub fn zero_corrections(&self) -> Vec<f64> {
         // q + offset + gear q = (q + shift)(1 + gear)
-        let of = |r: usize| self.sum_of(r, Term::Offset) / (1.0 + self.sum_of(r, Term::Gear));
+        let of =
+            |r: usize| (self.chain.found_zero(r) + self.sum_of(r, Term::Offset)) / (1.0 + self.sum_of(r, Term::Gear));
         (0..self.chain.readings.len()).map(of).collect()
     }
 
     /// This robot under a controller that adds `shifts` (rad or m) to its readings. What of the offsets they do not take stays an offset; the
-    /// terms are those of the new readings (exact for gears and harmonics, gravity as before), in their order.
+    /// terms are those of the new readings (exact for gears and harmonics, gravity as before), in their order. Of a joint whose zero was found
+    /// before the fit the origin takes the shift, so that gravity is that of the posture however far off it was.
     pub fn mastered_by(&self, shifts: &[f64]) -> Self {
         let mut robot = self.clone();
+        let by_origin = |r: usize| if self.chain.found_zero(r) == 0.0 { 0.0 } else { shifts[r] };
+        for (joint, twist) in robot.chain.joints.iter_mut().zip(&mut robot.twists) {
+            let by = joint.drive.map_or(0.0, |d| d.multiplier * by_origin(d.reading));
+            if by != 0.0 {
+                // Exp(xi) M(-s) = M(-s) Exp(Ad(M(s)) xi)
+                joint.origin = joint.origin * joint.motion(-by);
+                *twist = adjoint(&joint.motion(by)) * *twist;
+            }
+        }
         for t in &mut robot.terms {
             let (reading, shift) = (t.reading, shifts[t.reading]);
             let turned = |k: u8| (f64::from(k) * shift).sin_cos();
             // a cos k(q - s) + b sin k(q - s), sorted by cos kq and sin kq.
             t.value = match t.term {
-                Term::Offset => t.value - shift * (1.0 + self.sum_of(reading, Term::Gear)),
+                Term::Offset => t.value + by_origin(reading) - shift * (1.0 + self.sum_of(reading, Term::Gear)),
                 Term::Cosine(k) => turned(k).1 * t.value - turned(k).0 * self.sum_of(reading, Term::Sine(k)),
                 Term::Sine(k) => turned(k).1 * t.value + turned(k).0 * self.sum_of(reading, Term::Cosine(k)),
                 _ => t.value,
             };
         }
         robot
+    }
+
+    /// Derivatives of twists (six rows each) and terms of [`Robot::mastered_by`] by those of this robot, of which they are linear functions.
+    pub fn mastered_by_own(&self, shifts: &[f64]) -> DMatrix<f64> {
+        let numbers = |robot: &Self| {
+            let twists = robot.twists.iter().flat_map(|t| t.iter().copied());
+            DVector::from_iterator(self.numbers(), twists.chain(robot.terms.iter().map(|t| t.value)))
+        };
+        let with_one = |one: Option<usize>| {
+            let at = |k: usize| if Some(k) == one { 1.0 } else { 0.0 };
+            let mut robot = self.clone();
+            robot.twists.iter_mut().enumerate().for_each(|(k, t)| *t = Vector6::from_fn(|i, _| at(6 * k + i)));
+            let first = 6 * self.twists.len();
+            robot.terms.iter_mut().enumerate().for_each(|(k, t)| t.value = at(first + k));
+            numbers(&robot.mastered_by(shifts))
+        };
+        let none = with_one(None);
+        let columns: Vec<DVector<f64>> = (0..self.numbers()).map(|k| with_one(Some(k)) - &none).collect();
+        DMatrix::from_columns(&columns)
+    }
+
+    /// Number of its twists and terms.
+    fn numbers(&self) -> usize {
+        6 * self.twists.len() + self.terms.len()
     }
 
     /// Sum of the terms of one kind of a reading.

@@ -196,6 +196,21 @@ impl Chain {
         Some(self)
     }
 
+    /// The zero of a reading that was found before the fit and stands in the origins: what the readings lack in the direction in which they
+    /// count, rad or m; none behind which nothing lies that it could turn.
+    pub fn found_zero(&self, reading: usize) -> f64 {
+        let of = |(k, joint): (usize, &Joint)| match joint.found {
+            Some(FoundOrigin::Zero { offset, is_reversed }) if joint.drive.is_some_and(|d| d.reading == reading) => {
+                match is_reversed {
+                    true => self.joints.get(k + 1).map(|_| -offset),
+                    false => Some(offset),
+                }
+            }
+            _ => None,
+        };
+        self.joints.iter().enumerate().find_map(of).unwrap_or(0.0)
+    }
+
     /// True for the entry with the origin of a joint that moves.
     pub fn is_origin_of_moving(&self, index: usize) -> bool {
         let joint = &self.joints[index];

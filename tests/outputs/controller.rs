@@ -12,7 +12,7 @@ use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
 use robotcal::output::difference::compare_solutions;
 use robotcal::output::flange_table::flange_at;
-use robotcal::output::restore::{exported_robot, found_model};
+use robotcal::output::restore::{exported_model, exported_robot, found_model};
 use robotcal::output::{
     Offsets, compensated, files, kinematics_xacro, kinematics_yaml, read_compensation, solution_json,
 };
@@ -183,6 +183,50 @@ fn a_controller_that_took_the_determined_offsets_has_the_robot_that_was_found() 
     let apart = compare_solutions(&folded, &record).unwrap();
     assert!(apart.everywhere.rms_m < 1e-9, "one robot");
     assert_eq!(apart.zeros, record.offsets_to_enter, "which takes other joint angles");
+}
+
+/// Zeros that are tens of degrees off are in the origins since before the fit: the controller is to be given them, and the files are without.
+#[test]
+fn a_zero_that_was_found_before_the_fit_is_part_of_the_offset_to_enter() {
+    let description = robot();
+    let chain = description.chain(None, None).unwrap();
+    let lacking = [0.0, 0.0, -10f64.to_radians(), 25f64.to_radians(), 6f64.to_radians(), 0.0];
+    let mut series = series(CameraMount::Hand, &description);
+    for stop in &mut series.stops {
+        stop.readings.as_mut().unwrap().iter_mut().zip(&lacking).for_each(|(q, zero)| *q -= zero);
+    }
+    let options = Options { model: RobotModel::Full, ..Options::default() };
+    let solution = identify(chain.clone(), &[series], &options).unwrap();
+    assert!(solution.findings.iter().any(|f| f.code() == Code::ZeroOff), "no zero found, no test");
+    let mut mastering = context(&description);
+    mastering.offsets = Offsets::Mastering;
+    let files = files(&solution, &mastering).unwrap();
+    let record = solution_json::read(&files[solution_json::FILE_NAME]).unwrap();
+    let entered = to_enter(&files);
+    let table = rows(&text(&files, "mastering.csv"));
+    let of_joints = table.iter().zip(&entered).zip(lacking.iter().zip(&record.offsets_to_enter));
+    for ((row, entered), (lacking, recorded)) in of_joints.skip(2).take(3) {
+        // Offsets of the true robot are drawn with 3 mrad, and shared with its origins.
+        assert_eq!(row["in_urdf"], "no", "{row:?}");
+        assert!((entered - lacking).abs() < 0.025 && (entered - recorded).abs() < 1e-12, "{entered} {lacking}");
+    }
+    let written = reread(&files);
+    let nominal = Robot::nominal(chain);
+    let exported = exported_robot(&record).unwrap();
+    let [found, mastered] = [found_model(&record).unwrap(), exported_model(&record).unwrap()];
+    let [flange_before, flange_after] = [&found, &mastered].map(|m| m.flange().unwrap());
+    let mut without_gravity = exported.clone();
+    without_gravity.terms.retain(|t| !t.term.name().starts_with("gravity"));
+    for k in 0..20 {
+        let q: Vec<f64> = (0..6).map(|i| ((5 * k + 2 * i) as f64).sin()).collect();
+        let shown: Vec<f64> = q.iter().zip(&entered).map(|(q, o)| q + o).collect();
+        assert_same("solution", exported.base_from_tip(&shown), found.robot.base_from_tip(&q));
+        assert_same("files", written.base_from_tip(&shown), without_gravity.base_from_tip(&shown));
+        // Origins off by some 1 mrad each, and offsets that are not entered by up to 10.
+        assert!(written.base_from_tip(&shown).distance(&nominal.base_from_tip(&shown)).0 < 0.05, "the given zeros");
+        let [before, after] = [flange_before.at(&q), flange_after.at(&shown)].map(|f| f.sigmas());
+        assert!(before.iter().zip(&after).all(|(b, a)| (a / b - 1.0).abs() < 1e-6), "{before:?} {after:?}");
+    }
 }
 
 /// The URDF with frames is the exported one, and `compensate` knows the solution from which the exported one came.

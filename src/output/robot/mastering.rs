@@ -19,8 +19,8 @@ pub(super) fn exported(solution: &Solution, context: &Context) -> Robot {
     solution.fit.state.robot.mastered_by(&to_enter(solution, context))
 }
 
-/// What the controller is to add to its readings, rad or m: the offsets that are determined, as mastering.csv writes them; none for the other
-/// joints, whose offsets the origins hold.
+/// What the controller is to add to its readings, rad or m: the offsets that are determined, as mastering.csv writes them, with the zeros that
+/// were found before the fit; none for the other joints, whose offsets the origins hold.
 pub fn to_enter(solution: &Solution, context: &Context) -> Vec<f64> {
     let entered = |row: Row| if row.is_entered(context) { row.written() } else { 0.0 };
     rows(solution).into_iter().map(entered).collect()

@@ -222,7 +222,12 @@ pub fn entered_offsets(record: &SolutionRecord) -> Result<Vec<f64>> {
     match (record.offsets_in_mastering, record.offsets_to_enter.is_empty()) {
         (false, _) => Ok(vec![0.0; record.robot.readings.len()]),
         (true, false) => Ok(record.offsets_to_enter.clone()),
-        (true, true) => Ok(found_robot(record)?.zero_corrections()),
+        (true, true) => {
+            // Zeros that were found before the fit stood in the URDF then.
+            let mut robot = found_robot(record)?;
+            robot.chain.joints.iter_mut().for_each(|j| j.found = None);
+            Ok(robot.zero_corrections())
+        }
     }
 }
 
@@ -241,6 +246,13 @@ pub fn exported_robot(record: &SolutionRecord) -> Result<Robot> {
 /// A file that does not hang together.
 pub fn exported_model(record: &SolutionRecord) -> Result<FoundModel> {
     let (mut model, entered) = (found_model(record)?, entered_offsets(record)?);
+    if entered.iter().any(|offset| *offset != 0.0) {
+        // The parameters of the robot come first, and those of local errors and poses stay.
+        let own = model.robot.mastered_by_own(&entered);
+        let mut of_all = DMatrix::identity(model.layout.len(), model.layout.len());
+        of_all.view_mut((0, 0), own.shape()).copy_from(&own);
+        model.covariance = &of_all * &model.covariance * of_all.transpose();
+    }
     model.robot = exported_robot(record)?;
     model.stops.iter_mut().for_each(|stop| add(&mut stop.readings, &entered));
     Ok(model)
