@@ -186,7 +186,24 @@ fn solution_json_alone_gives_the_same_solution_again() {
         assert!((a[k] - b[k]).abs() < 1e-2 * sigma, "{}: {} {}", layout.columns[k].name, a[k], b[k]);
     }
     let same = compare_solutions(&record, &record_of(&again)).unwrap();
-    assert!(same.everywhere.rms_m < 1e-6 && same.parameters.is_empty(), "{same:?}");
+    assert!(same.everywhere.rms_m < 1e-6 && same.parameters.is_empty() && !same.disagrees(), "{same:?}");
+    // Parameters that differ by two sigmas each, and the flange by far more than both state of it.
+    let mut moved = record.clone();
+    for name in ["joint_a2", "joint_a3", "joint_a4"] {
+        let joint = moved.robot.joints.iter_mut().find(|j| j.name == name).unwrap();
+        for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate() {
+            let name = format!("robot/{name}/origin.{axis}");
+            let of = moved.estimates.iter_mut().find(|e| e.name == name).unwrap();
+            let by = 2.0 * std::f64::consts::SQRT_2 * of.sigma.unwrap();
+            *of.value.as_mut().unwrap() += by;
+            joint.twist[3 + k] += by;
+        }
+    }
+    let apart = compare_solutions(&record, &moved).unwrap();
+    let flange = apart.covered.as_ref().unwrap();
+    println!("{} m, {:?} sigmas", flange.rms_m, flange.sigmas());
+    assert!(apart.parameters.is_empty() && flange.rms_m > 3.0 * flange.stated_m.unwrap(), "{apart:?}");
+    assert!(flange.disagrees() && apart.disagrees());
     // With other options it is another solution, and the comparison says by how much.
     let fixed = Selection { fix: vec!["joint_a3.origin".into(), "joint_a3.offset".into()], ..Selection::default() };
     let options = Options { model: RobotModel::Rigid, selection: fixed, ..Options::default() };

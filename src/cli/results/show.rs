@@ -104,6 +104,10 @@ fn verdict_of(r: &SolutionRecord) -> Verdict {
     if r.failed_gates.is_empty() { Verdict::Good } else { Verdict::GateFailed }
 }
 
+/// Regions in which flanges are compared.
+const COVERED: &str = "in the region of the stops";
+const EVERYWHERE: &str = "within all joint limits";
+
 fn compare(args: &ShowArgs, a: &SolutionRecord, b: &SolutionRecord) -> Result<Verdict> {
     let found = compare_solutions(a, b)?;
     say_line!("first     {}", args.solutions[0].display());
@@ -112,10 +116,10 @@ fn compare(args: &ShowArgs, a: &SolutionRecord, b: &SolutionRecord) -> Result<Ve
         "flange    distance of the flange between the two models, base frames and a point of the flange brought together:"
     );
     match &found.covered {
-        Some(d) => print_difference("in the region of the stops", d, a),
+        Some(d) => print_difference(COVERED, d, a),
         None => say_line!("          their stops have no region in common"),
     }
-    print_difference("within all joint limits", &found.everywhere, a);
+    print_difference(EVERYWHERE, &found.everywhere, a);
     let apart = |(name, (zero, kind)): (&String, (&f64, &JointKind))| {
         let [_, unit] = kind.units();
         (*zero != 0.0).then(|| format!("{name} {:+.3} {unit}", 1e3 * zero))
@@ -128,8 +132,13 @@ fn compare(args: &ShowArgs, a: &SolutionRecord, b: &SolutionRecord) -> Result<Ve
             zeros.join(", ")
         );
     }
-    if found.parameters.is_empty() {
-        say_line!("differ    no parameter of the robot differs by more than 3 sigmas");
+    if !found.disagrees() {
+        say_line!("differ    neither the flange nor a parameter of the robot differs by more than 3 sigmas");
+    }
+    for (region, d) in found.covered.iter().map(|d| (COVERED, d)).chain([(EVERYWHERE, &found.everywhere)]) {
+        if let Some(sigmas) = d.sigmas().filter(|_| d.disagrees()) {
+            say_line!("differ    the flange {region}: {:.3} mm RMS, {sigmas:.1} sigmas", 1e3 * d.rms_m);
+        }
     }
     for (name, x, y, sigmas) in &found.parameters {
         say_line!("differ    {name}: {x:.3e} and {y:.3e}, {sigmas:.1} sigmas");

@@ -24,6 +24,18 @@ pub struct Difference {
     pub stated_m: Option<f64>,
 }
 
+impl Difference {
+    /// Sigmas by which the flange differs: the RMS distance over the stated sigma of both, no more than one where the two are as good as they say.
+    pub fn sigmas(&self) -> Option<f64> {
+        self.stated_m.filter(|stated| *stated > 0.0).map(|stated| self.rms_m / stated)
+    }
+
+    /// True where that is more than three.
+    pub fn disagrees(&self) -> bool {
+        self.sigmas().is_some_and(|sigmas| sigmas > DISAGREE)
+    }
+}
+
 /// Estimates of parameters of both that differ by more than three sigmas of their difference: name, first, second, sigmas.
 pub type Disagreement = (String, f64, f64, f64);
 
@@ -41,6 +53,13 @@ pub struct SolutionDifference {
     pub zeros: Vec<f64>,
     /// Joint names.
     pub joints: Vec<String>,
+}
+
+impl SolutionDifference {
+    /// True where the flange or a parameter differs by more than three sigmas.
+    pub fn disagrees(&self) -> bool {
+        !self.parameters.is_empty() || self.covered.iter().chain([&self.everywhere]).any(Difference::disagrees)
+    }
 }
 
 /// Compares `b` with `a` at the places of both workspace maps, for the readings that they were identified from.
