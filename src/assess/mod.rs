@@ -5,6 +5,7 @@ mod alone;
 mod clustered;
 mod expected_errors;
 mod flange;
+mod held;
 mod hold_out;
 mod hold_out_bodies;
 mod identifiability;
@@ -34,6 +35,7 @@ pub use alone::urdf_alone;
 pub use clustered::{Clustered, RootInformation, StopInformation, clustered_covariance};
 pub use expected_errors::expected_mm;
 pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
+pub use held::{HeldTest, contradicted};
 pub use hold_out::{
     Accuracy, Errors, ImageError, Refit, cluster_of_images, error_of_predicted, folds, hold_out, hold_out_images,
     predict_image, refitted, refitted_near, regions, seen_pose,

@@ -171,7 +171,7 @@ pub fn patterns(fit: &Fit, limits: &Limits) -> Result<Vec<PatternTest>, Singular
             bearer: g.bearer,
             statistic,
             degrees,
-            deviate: deviate(statistic, degrees),
+            deviate: deviate(statistic, degrees as f64),
             share,
             rms_px: rms_px * share.sqrt(),
             least_px: rms_px * (uneven * least(degrees, limits.pattern_sigmas) / squares).sqrt(),
@@ -197,7 +197,7 @@ pub fn camera_shows_pattern(fit: &Fit, camera: usize, limits: &Limits) -> Result
     let response = response(fit, &groups)?;
     let is_found = |g: &Group| {
         let Solved { statistic, degrees, .. } = solved(&response, g);
-        deviate(statistic, degrees) > limits.pattern_sigmas
+        deviate(statistic, degrees as f64) > limits.pattern_sigmas
     };
     Ok(groups.iter().any(is_found))
 }
@@ -377,9 +377,9 @@ fn combined(steps: &[Step], y: &DVector<f64>) -> Option<Step> {
 }
 
 /// Normal deviate of a chi-squared statistic (E. Wilson and M. Hilferty 1931).
-fn deviate(statistic: f64, degrees: usize) -> f64 {
-    let spread = 2.0 / (9.0 * degrees.max(1) as f64);
-    ((statistic / degrees.max(1) as f64).cbrt() - (1.0 - spread)) / spread.sqrt()
+pub(super) fn deviate(statistic: f64, degrees: f64) -> f64 {
+    let spread = 2.0 / (9.0 * degrees.max(1.0));
+    ((statistic / degrees.max(1.0)).cbrt() - (1.0 - spread)) / spread.sqrt()
 }
 
 /// Noncentrality at which a statistic is beyond `sigmas` with a probability of 95 %.
@@ -409,7 +409,7 @@ fn tolerances(fit: &Fit, rms_px: f64, squares: f64, limits: &Limits) -> Vec<Patt
             bearer: Bearer::Plate(plate),
             statistic: sum,
             degrees: told.round() as usize,
-            deviate: deviate(sum, told.round() as usize),
+            deviate: deviate(sum, told.round()),
             share: 0.0,
             rms_px: f64::NAN,
             least_px: rms_px * (least(told.round() as usize, limits.pattern_sigmas) / squares).sqrt(),

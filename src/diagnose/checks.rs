@@ -9,9 +9,9 @@ use super::left_out::{
 use super::steps::{loose, pose_step};
 use super::{
     camera_model, camera_pattern, contradicted_distances, extrapolates, few_images, focus, held_near_nominal,
-    joint_noise, length_standard, marker_off, measurement_scatter, mirror_image, no_gain, odd_image, parameter_off,
-    plate_size, reading_ratio, repeated_measurements, rounded_readings, scatter, small_gain, stated_noise, tag_size,
-    undetermined, zeros_off,
+    held_parameters, joint_noise, length_standard, marker_off, measurement_scatter, mirror_image, no_gain, odd_image,
+    parameter_off, plate_size, reading_ratio, repeated_measurements, rounded_readings, scatter, small_gain,
+    stated_noise, tag_size, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Error, Result};
@@ -120,6 +120,7 @@ pub const CHECKS: &[Check] = &[
     check("camera_pattern", Stage::Fit(|a, b, s| found(camera_pattern::check(a, b, s)))),
     check("few_images", Stage::Fit(|a, b, s| found(few_images::check(a, b, s)))),
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
+    check("held_parameters", Stage::Fit(|a, b, s| found(held_parameters::check(a, b, s)))),
     check("stated_noise", Stage::Fit(|a, b, s| found(stated_noise::check(a, b, s)))),
     Check {
         explains: |_, other| matches!(other, Finding::NoiseContradicted(noise) if noise.is_explained_by(Weight::Gate)),

@@ -10,6 +10,7 @@ use super::extrapolates::Extrapolates;
 use super::few_images::FewImages;
 use super::focus::FocusChange;
 use super::held_near_nominal::HeldNearNominal;
+use super::held_parameters::HeldContradicted;
 use super::joint_noise::JointNoiseLarge;
 use super::kind::{Kind, Quantity, Subject, Weight};
 use super::left_out::exchanged_pictures::ExchangedPictures;
@@ -85,6 +86,7 @@ findings! {
     Extrapolates,
     FewImages,
     FlangeUndetermined,
+    HeldContradicted,
     HeldNearNominal,
     FocusChange,
     ImagesLeftOut,

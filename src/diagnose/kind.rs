@@ -20,6 +20,8 @@ pub struct CheckContext<'a> {
     pub on_robot: usize,
     /// What the data say of a joint noise that was stated; none where it is estimated.
     pub stated_noise: Option<StatedNoise<'a>>,
+    /// Names of the parameters that the user holds.
+    pub fixed: &'a [String],
     /// Numbers that decide.
     pub limits: &'a Limits,
 }

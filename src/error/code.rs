@@ -331,6 +331,7 @@ codes! {
         Extrapolates "extrapolates" "outside the region of the stops the flange is known badly",
         MirrorImageFits "mirror_image_fits" "nothing in the data tells the arm from its mirror image",
         HeldNearNominal "held_near_nominal" "outside the region of the stops the robot is held near the nominal one",
+        HeldContradicted "held_contradicted" "the data contradict values at which parameters are held",
         FewImages "few_images" "few images: the nominal model decides much of the result",
         FocusChanged "focus_changed" "focus or zoom changed during the series",
         ReadingsRounded "readings_rounded" "joint readings were rounded to a step that is as large as the joint noise",

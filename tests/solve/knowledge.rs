@@ -166,6 +166,28 @@ fn a_configuration_with_an_unknown_key_is_refused_with_its_line() {
     assert!(Config::read(&path).unwrap_err().place.ends_with("robotcal.toml:2"));
 }
 
+/// Of a joint whose true origin and zero are elsewhere, of one that turns the whole base, of terms that the true robot does not have.
+#[test]
+fn what_is_held_at_a_value_that_the_data_contradict_is_named() {
+    let description = robot();
+    let series = [crate::outputs_support::series(CameraMount::Hand, &description)];
+    let found = |fix: &str, model: RobotModel| {
+        let selection = Selection { fix: vec![fix.into()], ..Selection::default() };
+        let options = Options { model, selection, ..Options::default() };
+        let solution = identify(description.chain(None, None).unwrap(), &series, &options).unwrap();
+        let found = solution.findings.into_iter().find(|f| f.code() == Code::HeldContradicted);
+        println!("{fix}: {:?}", found.as_ref().map(|f| (f.weight(), f.quantities())));
+        found
+    };
+    let wrong = found("joint_a3", RobotModel::Rigid).unwrap();
+    assert_eq!(wrong.weight(), Weight::Gate);
+    let named = |s: &Subject| matches!(s, Subject::Parameter(name) if name.starts_with("robot/joint_a3"));
+    assert!(!wrong.subjects().is_empty() && wrong.subjects().iter().all(named), "{:?}", wrong.subjects());
+    assert!(wrong.quantities().iter().any(|q| q.name == "deviate" && q.value > 4.0));
+    assert_eq!(found("joint_a1", RobotModel::Rigid), None);
+    assert_eq!(found("*.backlash", RobotModel::Full), None);
+}
+
 fn record_of(solution: &Solution) -> solution_json::SolutionRecord {
     let description = robot();
     let files = files(solution, &context(&description)).unwrap();

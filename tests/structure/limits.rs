@@ -67,6 +67,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("diagnose/left_out/exchanged_pictures.rs MOST_IMAGES", "how many are named"),
     ("diagnose/left_out/exchanged_readings.rs MOST_STOPS", "how many are named"),
     ("diagnose/steps/displaced.rs MOST_IMAGES", "how many are named"),
+    ("diagnose/held_parameters.rs MOST_NAMED", "how many are named"),
     ("diagnose/joint_noise.rs MOST_IMAGES", "how many are named"),
     ("diagnose/left_out/left_out_bodies.rs MOST_NAMED", "words"),
     ("diagnose/left_out/left_out_images.rs MOST_IMAGES", "how many are named"),

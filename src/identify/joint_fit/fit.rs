@@ -103,7 +103,14 @@ pub(in crate::identify) fn fit_model(
         fit(start, free, (&aside, near.as_ref(), has_same_lenses), options)
     };
     name_wrong_pairs(ended.adjustment_mut(), free, options.limits.other_readings_explain);
-    let context = CheckContext { series, free, on_robot, stated_noise: None, limits: &options.limits };
+    let context = CheckContext {
+        series,
+        free,
+        on_robot,
+        stated_noise: None,
+        fixed: &options.selection.fix,
+        limits: &options.limits,
+    };
     let mut diagnosis = Diagnosis::new(context);
     diagnosis.after_free_poses(&ended.adjustment().problem);
     diagnosis.after_left_out(ended.adjustment())?;
@@ -145,7 +152,14 @@ impl JointFit {
         let (free, limits, noise) = (start.free, &options.limits, options.joint_noise);
         let stated = noise.stated().zip(with_noise_found.as_ref());
         let stated_noise = stated.map(|(sigma, own)| StatedNoise { sigma, found: &own.fit, told: told.as_ref() });
-        let mut diagnosis = Diagnosis::new(CheckContext { series, free: &free, on_robot, stated_noise, limits });
+        let mut diagnosis = Diagnosis::new(CheckContext {
+            series,
+            free: &free,
+            on_robot,
+            stated_noise,
+            fixed: &options.selection.fix,
+            limits,
+        });
         diagnosis.after_free_poses(&fit.problem);
         diagnosis.after_left_out(&fit)?;
         if estimator.is_two_stage() && !fit.problem.body_measurements.is_empty() {

@@ -100,8 +100,14 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
         }
     };
     let Adjusted { fit, free_poses, starts } = poses;
-    let mut diagnosis =
-        Diagnosis::new(CheckContext { series: &series, free: &free_poses, on_robot: 0, stated_noise: None, limits });
+    let mut diagnosis = Diagnosis::new(CheckContext {
+        series: &series,
+        free: &free_poses,
+        on_robot: 0,
+        stated_noise: None,
+        fixed: &[],
+        limits,
+    });
     diagnosis.after_free_poses(&fit.problem);
     let mut findings = diagnosis.findings();
     findings.extend(many_left_out(&fit.problem, limits).map(Finding::from));
