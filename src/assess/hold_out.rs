@@ -54,8 +54,9 @@ const FOLDS: usize = 6;
 /// say how large it is: of a robot that is nearly right, base and tool would else be no better known than by the pose of each image alone.
 const NOMINAL_JOINT_ERROR: f64 = 3e-3;
 
-/// Rounds in which the joint error of the nominal robot is estimated: it is a weight, and need not be known well.
+/// Rounds in which the joint error of the nominal robot is estimated, and stops that tell it: it is a weight, and need not be known well.
 const NOMINAL_ROUNDS: usize = 8;
+const NOMINAL_NOISE_STOPS: usize = 40;
 
 /// Error of its pose that it is allowed in place of that where no image is, m and rad: base and tool are then where it misses least. By joint errors
 /// the few stops at which these cannot be what it misses by would decide.
@@ -96,10 +97,14 @@ pub(super) fn nominal(fit: &Adjustment) -> Outcome {
         return solve(nominal, &settings);
     }
     let rounds = NOMINAL_ROUNDS;
-    estimate_components(
-        nominal,
-        &ComponentOptions { factors: false, joint: true, displacement: false, rounds, settings },
-    )
+    let sizes = ComponentOptions { factors: false, joint: true, displacement: false, rounds, settings };
+    let Some(some) = nominal.some_stops(NOMINAL_NOISE_STOPS, NOMINAL_NOISE_STOPS) else {
+        return estimate_components(nominal, &sizes);
+    };
+    let some = estimate_components(some, &sizes).adjustment;
+    let mut nominal = nominal;
+    nominal.start_near_some(&some, 0.0);
+    solve(nominal, &settings)
 }
 
 fn of_nominal(fit: &Adjustment) -> Adjustment {
