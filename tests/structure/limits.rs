@@ -31,6 +31,8 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/flange.rs HELD", "rounding"),
     ("assess/flange.rs SAMPLES", "samples of an average"),
     ("assess/hold_out.rs FOLDS", "how the hold-out is divided"),
+    ("assess/hold_out.rs NOMINAL_NOISE_STOPS", "samples of an average"),
+    ("assess/hold_out.rs NOMINAL_ROUNDS", "rounds of an estimate"),
     ("assess/hold_out.rs MOST_STOPS", "samples of an average"),
     ("assess/hold_out.rs NOMINAL_JOINT_ERROR", "prior of the nominal fit"),
     ("assess/hold_out.rs NOMINAL_POSE_ERROR", "prior of the nominal fit"),

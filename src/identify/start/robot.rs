@@ -423,25 +423,34 @@ pub(in crate::identify) fn usual_misfit(adjustment: &Adjustment, free: &FreePose
 /// Square of three sigmas of six components: the quantile of chi-squared at 0.9973.
 const SQUARES_OF_POSE: f64 = 20.06;
 
-/// Squares of the misfit of an image by the covariance of the fit in use (robot, hand-eye transform and plate), of its stand-alone pose, and of
-/// the noise of its readings.
-fn squares(adjustment: &Adjustment, free: &FreePoses, covariance: &Covariance, image: usize) -> Option<f64> {
-    let Adjustment { problem, state } = adjustment;
-    let (own, tie, seen) = (&problem.images[image], &state.ties[image], free.poses[image].as_ref()?);
-    let stop = &problem.stops[own.stop];
-    let errors = vec![0.0; state.joint_errors[own.stop].len()];
-    let from = TakenFrom { posture: Some(problem.posture(image)?), joint_errors: &errors, tie };
-    let predicted = state.chained(&problem.layout, own, from)?;
-    let of_joints = (0..errors.len()).map(|r| problem.joint_error_variance(stop, r).iter().sum::<f64>());
-    let of_tie = (0..tie.len()).map(|k| problem.displacement_variance(own, k));
-    let mut latent = predicted.d_latent.clone();
-    latent.column_iter_mut().zip(of_joints.chain(of_tie)).for_each(|(mut by, variance)| by *= variance);
-    let (g, theta) = (&predicted.d_theta, problem.layout.theta_len());
-    let by_fit = g * covariance.reduced.view((0, 0), (theta, theta)) * g.transpose();
-    let all = by_fit + latent * predicted.d_latent.transpose();
-    let all = Matrix6::from_column_slice(all.as_slice()) + seen.covariance;
-    let apart = (predicted.pose.inverse() * seen.camera_from_plate).log();
-    Some(apart.dot(&all.cholesky()?.solve(&apart)))
+/// What a fit knows of images that it does not use.
+struct Prediction<'a> {
+    adjustment: &'a Adjustment,
+    covariance: Covariance,
+    free: &'a FreePoses,
+}
+
+impl Prediction<'_> {
+    /// Squares of the misfit of an image by the covariance of the fit in use (robot, hand-eye transform and plate), of its stand-alone pose, and of
+    /// the noise of its readings.
+    fn squares(&self, image: usize) -> Option<f64> {
+        let Adjustment { problem, state } = self.adjustment;
+        let (own, tie, seen) = (&problem.images[image], &state.ties[image], self.free.poses[image].as_ref()?);
+        let stop = &problem.stops[own.stop];
+        let errors = vec![0.0; state.joint_errors[own.stop].len()];
+        let from = TakenFrom { posture: Some(problem.posture(image)?), joint_errors: &errors, tie };
+        let predicted = state.chained(&problem.layout, own, from)?;
+        let of_joints = (0..errors.len()).map(|r| problem.joint_error_variance(stop, r).iter().sum::<f64>());
+        let of_tie = (0..tie.len()).map(|k| problem.displacement_variance(own, k));
+        let mut latent = predicted.d_latent.clone();
+        latent.column_iter_mut().zip(of_joints.chain(of_tie)).for_each(|(mut by, variance)| by *= variance);
+        let (g, theta) = (&predicted.d_theta, problem.layout.theta_len());
+        let by_fit = g * self.covariance.reduced.view((0, 0), (theta, theta)) * g.transpose();
+        let all = by_fit + latent * predicted.d_latent.transpose();
+        let all = Matrix6::from_column_slice(all.as_slice()) + seen.covariance;
+        let apart = (predicted.pose.inverse() * seen.camera_from_plate).log();
+        Some(apart.dot(&all.cholesky()?.solve(&apart)))
+    }
 }
 
 /// Takes images back that were set `aside` with the nominal robot, and fit the robot that was found as the others do, or as well as it is known
@@ -459,10 +468,9 @@ pub(in crate::identify) fn take_back(
     let mut back: Vec<usize> = out.iter().copied().filter(fits).collect();
     if back.is_empty() && !out.is_empty() {
         let covariance = outcome.linear().and_then(|linear| linear.covariance().ok());
-        let is_predicted = |i: &usize| {
-            let squares = covariance.as_ref().and_then(|known| squares(adjustment, free, known, *i));
-            squares.is_some_and(|squares| squares < SQUARES_OF_POSE)
-        };
+        let known = covariance.map(|covariance| Prediction { adjustment, covariance, free });
+        let squares = |i: &usize| known.as_ref()?.squares(*i);
+        let is_predicted = |i: &usize| squares(i).is_some_and(|squares| squares < SQUARES_OF_POSE);
         back = out.into_iter().filter(is_predicted).collect();
     }
     back.iter().for_each(|&i| outcome.adjustment.problem.images[i].rejected = None);

@@ -61,7 +61,7 @@ pub fn in_frame(linear: LinearProblem, stated: &Covariance) -> Result<InFrame> {
 /// # Errors
 /// As [`in_frame`].
 pub fn in_frame_by(which: Elimination, linear: LinearProblem, stated: &Covariance) -> Result<InFrame> {
-    from_system(System::without_distances(which, linear, 0.0), linear, stated)
+    Stated { linear, covariance: stated }.in_frame_from(System::without_distances(which, linear, 0.0))
 }
 
 impl Fit {
@@ -72,33 +72,44 @@ impl Fit {
     pub fn in_frame(&self) -> Result<InFrame> {
         let is_whole = self.linearised.distances.is_empty() && self.problem.restraint.is_none();
         match self.covariance.own_system().filter(|_| is_whole) {
-            Some(system) => from_system(system.clone(), self.linear(), &self.covariance),
+            Some(system) => {
+                Stated { linear: self.linear(), covariance: &self.covariance }.in_frame_from(system.clone())
+            }
             None => in_frame(self.linear(), &self.covariance),
         }
     }
 }
 
-/// From the system without measured distances.
-fn from_system(mut system: System, linear: LinearProblem, stated: &Covariance) -> Result<InFrame> {
-    let problem = &linear.adjustment.problem;
-    let frames = frames(linear.adjustment)?;
-    let following = following(linear, &system, &frames);
-    widen_scales(problem, &frames, &mut system);
-    let combinations = combinations(linear, &frames);
-    let held = hold(&mut system, combinations, &following);
-    system.add_distances(linear, held.as_ref());
-    let singular =
-        |e: Singular| Error::new(Code::FitUndetermined, "plate", e.to_string(), "take images of more of the plate");
-    let factor = system.factor(linear).map_err(singular)?;
-    let mut covariance = Covariance::of(problem, system, factor);
-    if let (Eliminated::Stops(e), Some(held)) = (&covariance.system.eliminated, &held) {
-        e.project(held, &mut covariance.reduced);
+/// A linear problem with the covariance that is stated of it.
+struct Stated<'a> {
+    linear: LinearProblem<'a>,
+    covariance: &'a Covariance,
+}
+
+impl Stated<'_> {
+    /// From the system without measured distances.
+    fn in_frame_from(&self, mut system: System) -> Result<InFrame> {
+        let Self { linear, covariance: stated } = *self;
+        let problem = &linear.adjustment.problem;
+        let frames = frames(linear.adjustment)?;
+        let following = following(linear, &system, &frames);
+        widen_scales(problem, &frames, &mut system);
+        let combinations = combinations(linear, &frames);
+        let held = hold(&mut system, combinations, &following);
+        system.add_distances(linear, held.as_ref());
+        let singular =
+            |e: Singular| Error::new(Code::FitUndetermined, "plate", e.to_string(), "take images of more of the plate");
+        let factor = system.factor(linear).map_err(singular)?;
+        let mut covariance = Covariance::of(problem, system, factor);
+        if let (Eliminated::Stops(e), Some(held)) = (&covariance.system.eliminated, &held) {
+            e.project(held, &mut covariance.reduced);
+        }
+        if let Some(added) = &stated.added {
+            covariance.add(&followed(added.clone(), &following));
+        }
+        stated.enlarged.iter().for_each(|&(column, factor)| covariance.enlarge(column, factor));
+        Ok(InFrame { frames, covariance, of_second_stage: stated.replaced_first() })
     }
-    if let Some(added) = &stated.added {
-        covariance.add(&followed(added.clone(), &following));
-    }
-    stated.enlarged.iter().for_each(|&(column, factor)| covariance.enlarge(column, factor));
-    Ok(InFrame { frames, covariance, of_second_stage: stated.replaced_first() })
 }
 
 /// Poses that follow, of placements and of images without a tie to the robot.
