@@ -403,17 +403,34 @@ fn what_is_promised_of_the_flange_is_what_is_found() {
     }
 }
 
-/// Few images with much noise say little of a robot that is right: neither what is held out nor what is stated may make it look worse than it is.
+/// Few images with much noise.
+fn few_images(seed: u64, errors: RobotErrors) -> WorldRequest {
+    WorldRequest { errors, images: 12, pixel_sigma_px: 1.0, ..request(seed, 1e-4) }
+}
+
+/// Few images with much noise say little of a robot that is right: what is held out does not make it look worse than it is.
 #[test]
-fn a_robot_that_is_right_is_not_stated_worse_than_it_is() {
-    const SIGMA: f64 = 1e-4;
-    let (mut nominal2, mut calibrated2, mut found2, mut stated2, mut within) = (0.0, 0.0, 0.0, 0.0, 0);
-    let seeds = 51..=56;
-    for seed in seeds.clone() {
+fn held_out_images_do_not_speak_against_a_robot_that_is_right() {
+    let [mut nominal2, mut calibrated2] = [0.0; 2];
+    for seed in 51..=56 {
         let errors = RobotErrors { translation_m: 5e-5, rotation_rad: 1e-4, ..RobotErrors::NONE };
-        let made = series(&WorldRequest { errors, images: 12, pixel_sigma_px: 1.0, ..request(seed, SIGMA) }).unwrap();
+        let made = series(&few_images(seed, errors)).unwrap();
         let solution = identify(chain(), &[measured(&made, &chain())], &Options::default()).unwrap();
         let [nominal, calibrated] = [&solution.accuracy.nominal, &solution.accuracy.calibrated].map(|e| e.rms_mm);
+        println!("seed {seed}: held out {nominal:.3} -> {calibrated:.3} mm");
+        (nominal2, calibrated2) = (nominal2 + nominal * nominal, calibrated2 + calibrated * calibrated);
+    }
+    assert!(nominal2 < calibrated2, "held out: nominal {nominal2}, calibrated {calibrated2} mm^2");
+}
+
+/// The error of the nominal robot with the base and the tool that fit it best has nothing of what is not known of these.
+#[test]
+fn the_nominal_robot_is_stated_no_worse_than_it_is() {
+    let (mut found2, mut stated2, mut within) = (0.0, 0.0, 0);
+    let seeds = 61..=68;
+    for seed in seeds.clone() {
+        let made = series(&few_images(seed, RobotErrors::default())).unwrap();
+        let solution = identify(chain(), &[measured(&made, &chain())], &Options::default()).unwrap();
         let truth = true_robot(&made.truth);
         let covered = &solution.uncertainty.identifiability.as_ref().unwrap().covered;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -421,28 +438,20 @@ fn a_robot_that_is_right_is_not_stated_worse_than_it_is() {
             .map(|_| {
                 let readings: Vec<f64> = covered.iter().map(|(_, low, high)| rng.random_range(*low..*high)).collect();
                 let noise: [f64; 6] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
-                let position_m = truth.pose_at(&Posture::at(&readings), &noise.map(|x| SIGMA * x)).translation;
+                let position_m = truth.pose_at(&Posture::at(&readings), &noise.map(|x: f64| 1e-4 * x)).translation;
                 MeasuredPoint { position_m, readings }
             })
             .collect();
         let found = fit_points(&Robot::nominal(chain()), &points).unwrap().rms_m;
         let e = solution.uncertainty.flange.unwrap();
         let [low, high] = e.intervals.unwrap().nominal_m;
-        println!(
-            "seed {seed}: held out {nominal:.3} -> {calibrated:.3} mm; nominal {:.3} stated ({:.3} to {:.3}), {:.3} found; calibrated {:.3} stated",
-            1e3 * e.nominal_m,
-            1e3 * low,
-            1e3 * high,
-            1e3 * found,
-            1e3 * e.model_m
-        );
-        (nominal2, calibrated2) = (nominal2 + nominal * nominal, calibrated2 + calibrated * calibrated);
+        let mm = [e.nominal_m, low, high, found, e.model_m].map(|m| 1e3 * m);
+        println!("seed {seed}: nominal, its interval, found, and calibrated, mm: {mm:.3?}");
         (found2, stated2) = (found2 + found * found, stated2 + e.nominal_m * e.nominal_m);
         within += usize::from((low..high).contains(&found));
     }
-    assert!(nominal2 < calibrated2, "held out: nominal {nominal2}, calibrated {calibrated2} mm^2");
     let ratio = f64::sqrt(stated2 / found2);
-    assert!((0.7..1.5).contains(&ratio), "stated over found {ratio}");
+    assert!((0.8..1.25).contains(&ratio), "stated over found {ratio}");
     assert!(within + 1 >= seeds.count(), "{within} within the interval");
 }
 
