@@ -134,25 +134,16 @@ impl<'a> FlangeModel<'a> {
         self.layout.mountings.iter().any(|r| r.start == self.still_column)
     }
 
-    /// The same relative to the base that fits the stops best, where nothing that stands still remains.
-    pub(super) fn with_fitted_base(self, stops: &[Posture]) -> Option<Self> {
-        self.taking_up(stops, 6)
-    }
-
-    /// The same with the base and the tool that fit the positions of the flange at `samples` best: errors of these are no errors.
-    pub(super) fn with_base_and_tool_of_positions(self, samples: &[Posture]) -> Option<Self> {
-        self.taking_up(samples, 3)
-    }
-
-    /// Least squares over tool and base, `J(q) = tool + Ad(pose(q)^-1) base`, in the first `rows` of the body twist.
-    fn taking_up(mut self, at: &[Posture], rows: usize) -> Option<Self> {
+    /// The same relative to the base that fits the stops best, where nothing that stands still remains: least squares over
+    /// tool and base, `J(q) = tool + Ad(pose(q)^-1) base`.
+    pub(super) fn with_fitted_base(mut self, stops: &[Posture]) -> Option<Self> {
         let columns = self.layout.theta_len();
         let (mut n, mut rhs) = (DMatrix::zeros(12, 12), DMatrix::zeros(12, columns));
-        for (pose, j) in at.iter().map(|s| self.derivative(s)) {
+        for (pose, j) in stops.iter().map(|s| self.derivative(s)) {
             let mut a = DMatrix::identity(6, 12);
             a.fixed_view_mut::<6, 6>(0, 6).copy_from(&adjoint(&pose.inverse()));
-            n += a.rows(0, rows).tr_mul(&a.rows(0, rows));
-            rhs += a.rows(0, rows).tr_mul(&j.rows(0, rows));
+            n += a.tr_mul(&a);
+            rhs += a.tr_mul(&j);
         }
         let scale = n.diagonal().mean();
         (0..12).for_each(|k| n[(k, k)] += HELD * scale);

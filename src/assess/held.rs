@@ -12,7 +12,6 @@ use super::limits::Limits;
 use super::patterns::deviate;
 use crate::fit::Fit;
 use crate::linalg::SymmetricFactor;
-use crate::solve::in_frame;
 
 /// Parameters that are held at values which the data contradict.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,7 +44,7 @@ pub fn contradicted(fit: &Fit, held: &[usize], limits: &Limits) -> Option<HeldTe
     let step = told.iter().zip(score.iter()).fold(DVector::zeros(layout.theta_len()), |step, (&c, b)| {
         step + covariance.reduced.view((0, c), (layout.theta_len(), 1)).column(0) * *b
     });
-    let framed = in_frame(fit.linear(), &fit.covariance).ok().map(|framed| framed.dense(layout.len()));
+    let framed = fit.in_frame().ok().map(|framed| framed.dense(layout.len()));
     let model = FlangeModel::of(fit, framed.as_ref().unwrap_or(&fit.covariance.reduced), limits);
     let columns = columns.into_iter().map(|(i, deviate)| (told[i], deviate)).collect();
     Some(HeldTest { columns, deviate, moved_m: model.map(|m| m.moved_m(&step)) })

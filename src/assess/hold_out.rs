@@ -13,7 +13,8 @@ use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Image, Problem, State, TakenFrom, Weighting, posture_groups, predict};
 use crate::solve::{
-    ComponentOptions, LinearProblem, LinearisedAdjustment, Outcome, Settings, estimate_components, side_by_side, solve,
+    ComponentOptions, LinearProblem, LinearisedAdjustment, Outcome, Settings, Status, estimate_components,
+    side_by_side, solve,
 };
 use crate::stage::stage;
 
@@ -101,9 +102,11 @@ pub(super) fn nominal(fit: &Adjustment) -> Outcome {
     let Some(some) = nominal.some_stops(NOMINAL_NOISE_STOPS, NOMINAL_NOISE_STOPS) else {
         return estimate_components(nominal, &sizes);
     };
-    let some = estimate_components(some, &sizes).adjustment;
+    let some = estimate_components(some, &sizes);
     let mut nominal = nominal;
-    nominal.start_near_some(&some, 0.0);
+    if some.status == Status::Converged {
+        nominal.start_near_some(&some.adjustment, 0.0);
+    }
     solve(nominal, &settings)
 }
 

@@ -198,7 +198,7 @@ limits! {
     plate_size_doubtful: f64 = 2.5;
     /// The same, of a first look from the fit with the stated size, from which a fit with a free size decides.
     plate_size_suspected: f64 = 1.5;
-    /// Standard deviation of the size by the links from which on they say nothing of it: small deviations ask for a small robot.
+    /// Standard deviation of the size by the links, relative to the size that they tell, from which on they say nothing of it.
     plate_size_told: f64 = 0.02;
     /// Prior sigmas of the x/y scale beyond which a plate was not made to size.
     plate_aspect_sigmas: f64 = 5.0;

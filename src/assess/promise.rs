@@ -3,8 +3,7 @@
 //! The error is that of the position relative to what stands still (the plate, or a fixed camera) at a stop of its own. Of the
 //! calibrated robot it is what the covariance says ([`FlangeModel`]: right on average over the stops), and what no model removes:
 //! joint noise and local errors. A description that holds less of the model is displaced against it besides, by so much RMS over
-//! the region; both parts add as squares. The nominal robot is given the base and the tool that fit it best, so that what is not known
-//! of these is no error of it.
+//! the region; both parts add as squares. The nominal robot is given the base and the tool that fit it best.
 
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -79,16 +78,14 @@ impl FlangeErrors {
         let model_m = model.sigma_m(&samples).hypot(scatter_m);
         let in_flange = |k: usize| exact(&whole, &samples[k]).rotation.transpose() * nominal.residuals_m[k];
         let interval = |known: &dyn Fn(usize) -> Vector3<f64>| model.interval_m(&samples, known, scatter);
-        // Base and tool that fit the nominal robot best take up what is not known of them.
-        let laid_over = model.clone().with_base_and_tool_of_positions(&samples)?;
         Some(Self {
-            nominal_m: laid_over.sigma_m(&samples).hypot(scatter_m).hypot(nominal.rms_m),
+            nominal_m: model_m.hypot(nominal.rms_m),
             urdf_m: model_m.hypot(rms(&lacking)),
             alone_m: alone_lacks.as_ref().map(|lacking| model_m.hypot(rms(lacking))),
             model_m,
             scatter_m,
             intervals: Some(FlangeIntervals {
-                nominal_m: laid_over.interval_m(&samples, in_flange, scatter),
+                nominal_m: interval(&in_flange),
                 urdf_m: interval(&|k| -lacking[k]),
                 alone_m: alone_lacks.as_ref().map(|lacking| interval(&|k| -lacking[k])),
                 model_m: interval(&|_| Vector3::zeros()),
