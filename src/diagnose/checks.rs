@@ -120,7 +120,19 @@ pub const CHECKS: &[Check] = &[
     check("camera_pattern", Stage::Fit(|a, b, s| found(camera_pattern::check(a, b, s)))),
     check("few_images", Stage::Fit(|a, b, s| found(few_images::check(a, b, s)))),
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
-    check("held_parameters", Stage::Fit(|a, b, s| found(held_parameters::check(a, b, s)))),
+    Check {
+        explains: |own, other| {
+            let taken_up = matches!(
+                other,
+                Finding::DoubtedSize(_)
+                    | Finding::LooseMounting(_)
+                    | Finding::ParameterOff(_)
+                    | Finding::JointNoiseLarge(_)
+            );
+            matches!(own, Finding::HeldContradicted(own) if own.weight == Weight::Gate) && taken_up
+        },
+        ..check("held_parameters", Stage::Fit(|a, b, s| found(held_parameters::check(a, b, s))))
+    },
     check("stated_noise", Stage::Fit(|a, b, s| found(stated_noise::check(a, b, s)))),
     Check {
         explains: |_, other| matches!(other, Finding::NoiseContradicted(noise) if noise.is_explained_by(Weight::Gate)),

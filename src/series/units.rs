@@ -315,7 +315,7 @@ impl JointsBeside {
     /// Of readings beside a chain.
     pub(super) fn of(stops: &Stops, chain: &Chain) -> Self {
         let (told, untold): (Vec<String>, Vec<String>) =
-            chain.beside.iter().cloned().partition(|joint| stops.joints.contains(joint));
+            chain.beside_arm().cloned().partition(|joint| stops.joints.contains(joint));
         Self { moved: told.into_iter().filter(|joint| differs(stops, joint)).collect(), untold }
     }
 

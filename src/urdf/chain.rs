@@ -134,9 +134,16 @@ pub struct Chain {
     pub masses: Vec<CarriedMass>,
     /// Names of the joints of the description that move and whose readings the chain does not need.
     pub beside: Vec<String>,
+    /// Those of them behind the tip, as the fingers of a gripper: they move nothing of the chain, nor what it is measured against.
+    pub behind_tip: Vec<String>,
 }
 
 impl Chain {
+    /// Names of joints beside the chain that may move what it stands on, or what it is measured against.
+    pub fn beside_arm(&self) -> impl Iterator<Item = &String> {
+        self.beside.iter().filter(|joint| !self.behind_tip.contains(joint))
+    }
+
     /// Number of entries that are passed upwards: they come first, and behind them lies the link above both base and tip.
     pub fn climbed(&self) -> usize {
         self.joints.iter().take_while(|j| j.upwards).count()
@@ -234,6 +241,7 @@ impl Chain {
             reading_kinds: Vec::new(),
             masses: Vec::new(),
             beside: Vec::new(),
+            behind_tip: Vec::new(),
         }
     }
 }

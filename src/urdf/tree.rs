@@ -54,6 +54,7 @@ impl RobotDescription {
             reading_kinds: Vec::new(),
             masses: Vec::new(),
             beside: Vec::new(),
+            behind_tip: Vec::new(),
         };
         let (up, down) = self.path(base, tip)?;
         if up.len() + down.len() > MOST_JOINTS {
@@ -85,7 +86,9 @@ impl RobotDescription {
         self.refuse_millimetres(&chain)?;
         chain.masses = self.stated_masses(&chain);
         let is_beside = |j: &&JointElement| j.joint_type != JointType::Fixed && !chain.readings.contains(&j.name);
-        chain.beside = self.joints.iter().filter(is_beside).map(|j| j.name.clone()).collect();
+        let beside = || self.joints.iter().filter(is_beside);
+        chain.beside = beside().map(|j| j.name.clone()).collect();
+        chain.behind_tip = beside().filter(|j| self.is_behind(tip, j)).map(|j| j.name.clone()).collect();
         Ok(chain)
     }
 
@@ -101,6 +104,11 @@ impl RobotDescription {
         let remedy =
             "a URDF has metres: if these are millimetres, divide the xyz of all origins by 1000 (and scale the meshes)";
         Err(Error::new(Code::UrdfLengthUnit, self.path.display(), what, remedy))
+    }
+
+    /// True for a joint that a link carries, at once or by others.
+    fn is_behind(&self, link: &str, joint: &JointElement) -> bool {
+        joint.parent == link || self.ancestors(&joint.parent).contains(&link)
     }
 
     /// The joint above a link.
@@ -358,5 +366,35 @@ fn kind(element: &JointElement) -> Result<JointKind> {
             );
             Err(Error::new(Code::ChainImpossible, place, what, remedy))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::urdf::RobotDescription;
+
+    #[test]
+    fn what_hangs_behind_the_tip_moves_nothing_beside_the_arm() {
+        let joint = |(name, from, to): (&str, &str, &str)| {
+            format!(
+                "<joint name='{name}' type='revolute'><parent link='{from}'/><child link='{to}'/><origin xyz='0 0 0.3'/>\
+                 <axis xyz='0 0 1'/><limit lower='-3' upper='3' effort='0' velocity='0'/></joint>"
+            )
+        };
+        let joints = [
+            ("a1", "base", "arm"),
+            ("a2", "arm", "tool0"),
+            ("finger", "tool0", "f"),
+            ("nail", "f", "n"),
+            ("table", "base", "t"),
+        ];
+        let links: String = ["base", "arm", "tool0", "f", "n", "t"].map(|l| format!("<link name='{l}'/>")).concat();
+        let text = format!("<robot name='r'>{links}{}</robot>", joints.map(joint).concat());
+        let robot = RobotDescription::from_text(Path::new("r.urdf"), text).unwrap();
+        let chain = robot.chain(Some("base"), Some("tool0")).unwrap();
+        assert_eq!(chain.beside, ["finger", "nail", "table"]);
+        assert_eq!(chain.beside_arm().collect::<Vec<_>>(), ["table"]);
     }
 }

@@ -106,6 +106,7 @@ pub fn chain(dice: &mut Dice, parts: &[Part]) -> Chain {
         reading_kinds: kinds,
         masses,
         beside: Vec::new(),
+        behind_tip: Vec::new(),
     }
 }
 

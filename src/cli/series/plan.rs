@@ -235,9 +235,11 @@ fn robot(args: &PlanArgs, record: Option<&SolutionRecord>) -> Result<(RobotDescr
     match (record, given) {
         (Some(record), given) => {
             let ends = [base.unwrap_or(&record.robot.base), tip.unwrap_or(&record.robot.tip)];
-            // Of a cell of two arms the URDF given may be that of one of them.
-            let whole = given.filter(|urdf| ends.iter().all(|end| urdf.links().any(|link| link == *end)));
-            let description = whole.map_or_else(|| restore::robot_description(record), Ok)?;
+            let description = match given {
+                Some(urdf) if ends.iter().all(|end| urdf.links().any(|link| link == *end)) => urdf,
+                Some(urdf) => description_of_cell(record, &urdf)?,
+                None => restore::robot_description(record)?,
+            };
             let chain = restore::chain(record, &description, ends[0], ends[1])?;
             say_notices(&description);
             Ok((description, chain))
@@ -248,6 +250,22 @@ fn robot(args: &PlanArgs, record: Option<&SolutionRecord>) -> Result<(RobotDescr
         }
         (None, None) => Err(Error::new(Code::OptionMissing, "--urdf", "is missing", "give the URDF of the robot")),
     }
+}
+
+/// That of the result, where the one that is given is of an arm of its cell.
+fn description_of_cell(record: &SolutionRecord, given: &RobotDescription) -> Result<RobotDescription> {
+    let arm = given.chain(None, None)?;
+    let is_there = |name: &String| record.robot.readings.iter().any(|own| own == name);
+    if let Some(other) = arm.readings.iter().find(|name| !is_there(name)) {
+        return Err(Error::new(
+            Code::SolutionDiffers,
+            "--urdf",
+            format!("has the joint \"{other}\", and neither base nor tip of the result: it is of another robot"),
+            "give the URDF that the result was identified with, or none",
+        ));
+    }
+    say_line!("robot     of the cell as the result has it: the URDF that was given is of one arm of it");
+    restore::robot_description(record)
 }
 
 /// Says from which noise further images are planned: that of the result.
