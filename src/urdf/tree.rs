@@ -88,7 +88,8 @@ impl RobotDescription {
         let is_beside = |j: &&JointElement| j.joint_type != JointType::Fixed && !chain.readings.contains(&j.name);
         let beside = || self.joints.iter().filter(is_beside);
         chain.beside = beside().map(|j| j.name.clone()).collect();
-        chain.behind_tip = beside().filter(|j| self.is_behind(tip, j)).map(|j| j.name.clone()).collect();
+        let carried = self.carried_by(tip);
+        chain.behind_tip = beside().filter(|j| carried.contains(j.parent.as_str())).map(|j| j.name.clone()).collect();
         Ok(chain)
     }
 
@@ -106,9 +107,17 @@ impl RobotDescription {
         Err(Error::new(Code::UrdfLengthUnit, self.path.display(), what, remedy))
     }
 
-    /// True for a joint that a link carries, at once or by others.
-    fn is_behind(&self, link: &str, joint: &JointElement) -> bool {
-        joint.parent == link || self.ancestors(&joint.parent).contains(&link)
+    /// The links that a link carries by joints, itself among them.
+    fn carried_by<'a>(&'a self, link: &'a str) -> BTreeSet<&'a str> {
+        let mut below: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        self.joints.iter().for_each(|j| below.entry(&j.parent).or_default().push(&j.child));
+        let (mut carried, mut next) = (BTreeSet::new(), vec![link]);
+        while let Some(link) = next.pop() {
+            if carried.insert(link) {
+                next.extend(below.get(link).into_iter().flatten());
+            }
+        }
+        carried
     }
 
     /// The joint above a link.
