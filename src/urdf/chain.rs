@@ -173,7 +173,12 @@ impl Chain {
 
     /// True where camera and plate are both carried: the base moves, too.
     pub fn base_moves(&self) -> bool {
-        self.joints.iter().any(|j| !j.states_origin())
+        self.carrying_base().next().is_some()
+    }
+
+    /// Entries of the joints that carry the base.
+    pub fn carrying_base(&self) -> impl Iterator<Item = &Joint> {
+        self.joints.iter().filter(|j| !j.states_origin())
     }
 
     /// The chain with another zero of a reading, which may count the other way: `m (s q + o) + c` in the place of `m q + c`. A reversed joint is turned

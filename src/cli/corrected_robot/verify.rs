@@ -210,7 +210,7 @@ fn refuse_far(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Resu
     let why = ": no error of a robot, but another robot or other readings";
     let mut remedy = "check --joint-unit, the order of the joint columns, and the unit of the points (m)".to_owned();
     let chain = &model.robot.chain;
-    let carrying = chain.joints.iter().filter(|joint| joint.upwards && joint.drive.is_some()).map(|joint| &joint.name);
+    let carrying = chain.carrying_base().map(|joint| &joint.name);
     let others: Vec<&str> = carrying.chain(chain.beside_arm()).map(String::as_str).collect();
     // Of links that stand still to each other the frame of the device takes up which is the base.
     if !others.is_empty() {

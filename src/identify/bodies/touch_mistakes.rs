@@ -372,8 +372,7 @@ fn of_another_place(touches: &Touches, k: usize) -> Option<(Touches, What)> {
 /// these joints stand at all touches as at the first.
 fn not_carried(robot: &KnownRobot, touches: &Touches) -> Option<(Touches, What)> {
     let chain = &robot.exported().chain;
-    let carrying = chain.joints.iter().take(chain.climbed()).filter_map(|joint| joint.drive);
-    let carrying: BTreeSet<usize> = carrying.map(|drive| drive.reading).collect();
+    let carrying: BTreeSet<usize> = chain.carrying_base().filter_map(|j| j.drive).map(|d| d.reading).collect();
     let first = touches.postures.first()?.readings.clone();
     let mut undone = touches.clone();
     for posture in &mut undone.postures {
