@@ -121,15 +121,15 @@ pub const CHECKS: &[Check] = &[
     check("few_images", Stage::Fit(|a, b, s| found(few_images::check(a, b, s)))),
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
     Check {
-        explains: |own, other| {
-            let taken_up = matches!(
-                other,
+        explains: |own, other| match (own, other) {
+            (
+                Finding::HeldContradicted(own),
                 Finding::DoubtedSize(_)
-                    | Finding::LooseMounting(_)
-                    | Finding::ParameterOff(_)
-                    | Finding::JointNoiseLarge(_)
-            );
-            matches!(own, Finding::HeldContradicted(own) if own.weight == Weight::Gate) && taken_up
+                | Finding::LooseMounting(_)
+                | Finding::ParameterOff(_)
+                | Finding::JointNoiseLarge(_),
+            ) => own.weight == Weight::Gate,
+            _ => false,
         },
         ..check("held_parameters", Stage::Fit(|a, b, s| found(held_parameters::check(a, b, s))))
     },
