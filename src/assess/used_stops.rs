@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::geom::Pose;
 use crate::model::robot::Posture;
-use crate::problem::{Adjustment, Problem};
+use crate::problem::{Adjustment, Layout, Names, Problem, State};
 use crate::series::CameraMount;
 
 /// Stops of the images in use.
@@ -46,11 +46,23 @@ impl Standing {
     }
 
     /// What stands still for most images; of several the first by name, so that the order of the series says nothing.
-    pub fn of_most<'a>(images: impl Iterator<Item = Self>, name: impl Fn(Self) -> &'a str) -> Option<Self> {
+    pub fn of_most(images: impl Iterator<Item = Self>, names: &Names) -> Option<Self> {
         let mut images_of: BTreeMap<Self, usize> = BTreeMap::new();
         images.for_each(|standing| *images_of.entry(standing).or_default() += 1);
+        let name = |standing: Self| match standing {
+            Self::Placement(k) => &names.placements[k],
+            Self::Mounting(k) => &names.mountings[k],
+        };
         let order = |(a, of_a): &(Self, usize), (b, of_b): &(Self, usize)| of_b.cmp(of_a).then(name(*a).cmp(name(*b)));
         images_of.into_iter().min_by(order).map(|(standing, _)| standing)
+    }
+
+    /// Its pose in the base frame, with its first column.
+    pub fn placed(self, state: &State, layout: &Layout) -> (Pose, usize) {
+        match self {
+            Self::Placement(k) => (state.placements[k], layout.placements[k].start),
+            Self::Mounting(k) => (state.mountings[k], layout.mountings[k].start),
+        }
     }
 }
 
@@ -59,19 +71,13 @@ impl Standing {
 pub fn still(Adjustment { problem, state }: &Adjustment) -> Option<(Pose, usize)> {
     let layout = &problem.layout;
     let images = problem.used_on_robot().map(|i| &problem.images[i]);
-    let name = |standing| match standing {
-        Standing::Placement(k) => problem.placements[k].as_str(),
-        Standing::Mounting(k) => problem.mountings[k].as_str(),
-    };
-    let standing = Standing::of_most(images.map(|i| Standing::of(i.mount, i.mounting, i.placement)), name);
+    let names = Names { mountings: &problem.mountings, placements: &problem.placements, ..Names::default() };
+    let standing = Standing::of_most(images.map(|i| Standing::of(i.mount, i.mounting, i.placement)), &names);
     let Some(standing) = standing else {
         let (_, measured) = problem.used_bodies().next()?;
         return Some((state.instruments[measured.instrument], layout.instruments[measured.instrument].start));
     };
-    Some(match standing {
-        Standing::Placement(k) => (state.placements[k], layout.placements[k].start),
-        Standing::Mounting(k) => (state.mountings[k], layout.mountings[k].start),
-    })
+    Some(standing.placed(state, layout))
 }
 
 #[cfg(test)]
@@ -81,14 +87,14 @@ mod tests {
 
     #[test]
     fn what_stands_still_for_most_images_does_not_hang_on_their_order() {
-        let name = |standing| match standing {
-            Placement(k) => ["b", "a", "c"][k],
-            Mounting(_) => "camera",
-        };
+        let [placements, mountings] =
+            [&["b", "a", "c"][..], &["camera"]].map(|all| all.iter().map(|n| (*n).to_owned()));
+        let (placements, mountings): (Vec<String>, Vec<String>) = (placements.collect(), mountings.collect());
+        let names = Names { placements: &placements, mountings: &mountings, ..Names::default() };
         let of = |images: &[Standing]| {
             let turned: Vec<Standing> = images.iter().rev().copied().collect();
-            let found = Standing::of_most(images.iter().copied(), name);
-            assert_eq!(found, Standing::of_most(turned.into_iter(), name));
+            let found = Standing::of_most(images.iter().copied(), &names);
+            assert_eq!(found, Standing::of_most(turned.into_iter(), &names));
             found
         };
         assert_eq!(of(&[Placement(0), Placement(2), Placement(2), Mounting(0)]), Some(Placement(2)));

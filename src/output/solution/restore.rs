@@ -291,17 +291,17 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     let names = |all: &[super::solution_json::PlacedRecord]| all.iter().map(|p| p.name.clone()).collect::<Vec<_>>();
     let cameras: Vec<String> = record.cameras.iter().map(|c| c.name.clone()).collect();
     let plates: Vec<String> = record.plates.iter().map(|p| p.name.clone()).collect();
-    let mut layout = Layout::new(
-        &state,
-        &Names {
-            mountings: &names(&record.mountings),
-            placements: &names(&record.placements),
-            cameras: &cameras,
-            plates: &plates,
-            instruments: &record.bodies.named_instruments(),
-            bodies: &names(&record.bodies.bodies),
-        },
-    );
+    let [mountings, placements, bodies] =
+        [&record.mountings, &record.placements, &record.bodies.bodies].map(|all| names(all));
+    let names = Names {
+        mountings: &mountings,
+        placements: &placements,
+        cameras: &cameras,
+        plates: &plates,
+        instruments: &record.bodies.named_instruments(),
+        bodies: &bodies,
+    };
+    let mut layout = Layout::new(&state, &names);
     let n = layout.len();
     if record.estimates.len() != n || record.covariance_lower.len() != n * (n + 1) / 2 {
         return Err(damaged(format!("there are {} estimates for {n} parameters", record.estimates.len())));
@@ -315,15 +315,8 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
     let at = |i: usize, j: usize| record.covariance_lower[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
     let used = || record.images.iter().filter(|i| i.is_used());
     let stop = |i: &ImageRecord| i.readings.clone().map(|readings| Posture { readings, approach: i.approach.clone() });
-    let name = |standing| match standing {
-        Standing::Placement(k) => record.placements[k].name.as_str(),
-        Standing::Mounting(k) => record.mountings[k].name.as_str(),
-    };
     let standing = used().filter(|i| i.is_on_robot()).map(|i| Standing::of(i.camera_mount, i.mounting, i.placement));
-    let still = Standing::of_most(standing, name).map(|standing| match standing {
-        Standing::Placement(k) => (state.placements[k], layout.placements[k].start),
-        Standing::Mounting(k) => (state.mountings[k], layout.mountings[k].start),
-    });
+    let still = Standing::of_most(standing, &names).map(|standing| standing.placed(&state, &layout));
     let of_instrument = || first_instrument(&record.bodies).map(|(pose, k)| (pose, layout.instruments[k].start));
     let still = still.or_else(of_instrument);
     Ok(FoundModel {
