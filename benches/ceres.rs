@@ -15,7 +15,8 @@ use robotcal::init::{PosePair, solve_hand_eye};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{
-    Adjustment, Image, Layout, Mark, MarkerObservation, Names, Noise, PlateShape, Problem, State, Stop, Tie,
+    Adjustment, Image, JOINTS_IN_COMMON, Layout, Mark, MarkerObservation, Names, Noise, PlateShape, Problem, State,
+    Stop, Tie,
 };
 use robotcal::series::{CameraMount, Edge, Marker, Plate, PlateKind};
 use robotcal::solve::{Outcome, Settings, solve};
@@ -137,6 +138,7 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
         mountings: names("hand"),
         cameras: names("camera"),
         stops,
+        fewest_in_common: JOINTS_IN_COMMON,
         images,
         instruments: Vec::new(),
         bodies: Vec::new(),

@@ -146,7 +146,7 @@ fn joint(left: LinearisedAdjustment) -> Option<State> {
 /// Squared errors of one predicted image, summed over its markers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageError {
-    /// Between measured and predicted markers in the image, px^2.
+    /// Between measured and predicted markers in the image, px^2; the diagonal of the picture where the lens images no such place.
     pub px2: f64,
     /// Between where the image shows the markers and where the joint readings put them, mm^2.
     pub mm2: f64,
@@ -301,11 +301,12 @@ pub fn error_of_predicted(near: &Adjustment, state: &State, image: usize, seen: 
 }
 
 fn image_error(image: &Image, state: &State, predicted: &Pose, seen: &Pose) -> ImageError {
+    let camera = &state.cameras[image.camera];
+    let diagonal_px2 = f64::from(camera.width_px).powi(2) + f64::from(camera.height_px).powi(2);
     let mut e = ImageError { px2: 0.0, mm2: 0.0, count: 0.0 };
     for o in image.used() {
         let x = state.plates[image.plate].position(o.marker);
-        let Some(p) = predict(image, state, predicted, o) else { continue };
-        e.px2 += (o.uv - p.uv).norm_squared();
+        e.px2 += predict(image, state, predicted, o).map_or(diagonal_px2, |p| (o.uv - p.uv).norm_squared());
         e.mm2 += 1e6 * (predicted.transform(&x) - seen.transform(&x)).norm_squared();
         e.count += 1.0;
     }

@@ -193,8 +193,8 @@ fn shown(text: &str) -> String {
 
 /// The known name that was probably meant by `given`: at most two letters (a third of a short word) away, else `None`.
 ///
-/// Case and the choice between `-`, `_` and blank do not count. Numbers do: `stop 7` was not meant by `stop 8`. Of equally near names the first
-/// one wins.
+/// Case and the choice between `-`, `_` and blank do not count. Numbers do: `stop 7` was not meant by `stop 8`. So do axes: `x_m` was not meant by
+/// `z_m`. Of equally near names the first one wins.
 pub fn closest_name<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let given = plain(given);
     let numbers_of_given = numbers(&given);
@@ -203,6 +203,7 @@ pub fn closest_name<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -
         .into_iter()
         .map(|name| (plain(name), name))
         .filter(|(name, _)| name.len().abs_diff(given.len()) <= reach && numbers(name) == numbers_of_given)
+        .filter(|(name, _)| !is_of_another_axis(&given, name))
         .map(|(plain, name)| (edit_distance(&given, &plain), name))
         .filter(|(distance, _)| *distance <= reach)
         .min_by_key(|(distance, _)| *distance)
@@ -242,6 +243,20 @@ fn plain(name: &str) -> Vec<char> {
 fn numbers(plain: &[char]) -> Vec<String> {
     let digits = plain.split(|c| !c.is_ascii_digit()).filter(|digits| !digits.is_empty());
     digits.map(|digits| digits.iter().skip_while(|c| **c == '0').collect()).collect()
+}
+
+/// Whether names differ in the letter of an axis alone, or in a word of one letter: `qx` and `qw`, `a_deg` and `b_deg`.
+fn is_of_another_axis(a: &[char], b: &[char]) -> bool {
+    let is_axis = |c: char| matches!(c, 'u'..='z');
+    let is_end = |c: Option<&char>| c.is_none_or(|c| *c == '_');
+    let mut apart = (0..a.len()).filter(|&k| b.get(k) != Some(&a[k]));
+    match (apart.next(), apart.next()) {
+        (Some(k), None) if a.len() == b.len() => {
+            let is_word = is_end(k.checked_sub(1).map(|before| &a[before])) && is_end(a.get(k + 1));
+            is_word || (is_axis(a[k]) && is_axis(b[k]))
+        }
+        _ => false,
+    }
 }
 
 /// Levenshtein distance.
@@ -316,5 +331,10 @@ mod tests {
         assert_eq!(closest_name("stop60", numbered), None);
         assert_eq!(closest_name("jont_a1", numbered), Some("joint_a1"));
         assert_eq!(closest_name("joint_a2", numbered), None);
+        let axes = ["x_m", "y_m", "qx", "qy", "a_deg", "b_deg", "sigma_x_m"];
+        for missing in ["z_m", "qw", "c_deg", "sigma_y_m"] {
+            assert_eq!(closest_name(missing, axes), None, "{missing}");
+        }
+        assert_eq!(closest_name("X m", axes), Some("x_m"));
     }
 }

@@ -10,8 +10,8 @@ use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
-    Adjustment, HUBER, Image, Layout, Mark, MarkerObservation, Names, Noise, PlateShape, Problem, State, Stop, Tie,
-    predict,
+    Adjustment, HUBER, Image, JOINTS_IN_COMMON, Layout, Mark, MarkerObservation, Names, Noise, PlateShape, Problem,
+    State, Stop, Tie, predict,
 };
 use crate::series::{CameraMount, Edge, Marker, Plate};
 
@@ -109,6 +109,7 @@ impl Setting {
             mountings: mounting_names,
             cameras: camera_names,
             stops: Vec::new(),
+            fewest_in_common: JOINTS_IN_COMMON,
             images: Vec::new(),
             instruments: Vec::new(),
             bodies: Vec::new(),

@@ -33,6 +33,8 @@ pub struct Problem {
     pub cameras: Vec<String>,
     /// Stops, in the order of series and row.
     pub stops: Vec<Stop>,
+    /// Readings in common that make two stops related: of the joints of an arm [`JOINTS_IN_COMMON`](super::JOINTS_IN_COMMON), of poses all coordinates.
+    pub fewest_in_common: usize,
     /// Images, in the order of their stops.
     pub images: Vec<Image>,
     /// Frames in which bodies are measured.

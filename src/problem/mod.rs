@@ -55,7 +55,7 @@ pub use measured_series::{
 pub use noise::Noise;
 pub use plate_distance::{PlateDistance, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance};
 pub use plate_shape::PlateShape;
-pub use postures::{joined, posture_groups, related_readings};
+pub use postures::{JOINTS_IN_COMMON, joined, posture_groups, related_readings};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
 pub use restraint::{JointPrior, Restraint};
 pub use rounding::Rounding;

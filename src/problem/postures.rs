@@ -8,24 +8,24 @@ use crate::model::robot::Posture;
 /// Readings closer than this, rad or m, are the same posture of a joint.
 const SAME_READING: f64 = 2e-3;
 
-/// Fewest readings in common that make two stops related: a single one agrees by chance now and then.
-const FEWEST_IN_COMMON: usize = 2;
+/// Fewest readings in common that make two stops of an arm related: a single one agrees by chance now and then.
+pub const JOINTS_IN_COMMON: usize = 2;
 
 /// Readings that two stops have in common, and those that they just fail to have beside others: among stops that are dense enough to agree by
-/// chance there are as many of the one kind as of the other. Empty where it may be chance.
-pub fn related_readings(a: &Posture, b: &Posture) -> [Vec<usize>; 2] {
+/// chance there are as many of the one kind as of the other. Empty where fewer than `fewest` are the same: it may be chance.
+pub fn related_readings(a: &Posture, b: &Posture, fewest: usize) -> [Vec<usize>; 2] {
     let apart = || a.readings.iter().zip(&b.readings).map(|(a, b)| (a - b).abs());
     let within = |range: Range<f64>| apart().enumerate().filter(|(_, d)| range.contains(d)).map(|(r, _)| r).collect();
     match apart().filter(|d| *d < SAME_READING).count() {
-        count if count + 1 < FEWEST_IN_COMMON => [Vec::new(), Vec::new()],
-        count if count < FEWEST_IN_COMMON => [Vec::new(), within(SAME_READING..2.0 * SAME_READING)],
+        count if count + 1 < fewest => [Vec::new(), Vec::new()],
+        count if count < fewest => [Vec::new(), within(SAME_READING..2.0 * SAME_READING)],
         _ => [within(0.0..SAME_READING), within(SAME_READING..2.0 * SAME_READING)],
     }
 }
 
 /// Readings that two stops have in common; empty where it may be chance.
-fn common_readings(a: &Posture, b: &Posture) -> Vec<usize> {
-    let [common, _] = related_readings(a, b);
+fn common_readings(a: &Posture, b: &Posture, fewest: usize) -> Vec<usize> {
+    let [common, _] = related_readings(a, b, fewest);
     common
 }
 
@@ -54,9 +54,10 @@ pub fn joined(count: usize, pairs: impl Iterator<Item = (usize, usize)>) -> Vec<
 /// Images of `among` in groups that share readings, directly or through others; an image off the robot is alone.
 pub fn posture_groups(problem: &Problem, among: &[usize]) -> Vec<Vec<usize>> {
     let posture = |k: usize| problem.posture(among[k]);
+    let are_related = |a: &Posture, b: &Posture| !common_readings(a, b, problem.fewest_in_common).is_empty();
     let related = (0..among.len())
         .flat_map(|a| (0..a).map(move |b| (b, a)))
-        .filter(|&(a, b)| posture(a).zip(posture(b)).is_some_and(|(a, b)| !common_readings(a, b).is_empty()));
+        .filter(|&(a, b)| posture(a).zip(posture(b)).is_some_and(|(a, b)| are_related(a, b)));
     joined(among.len(), related).into_iter().map(|set| set.into_iter().map(|k| among[k]).collect()).collect()
 }
 
@@ -68,8 +69,9 @@ mod tests {
     fn one_reading_in_common_is_chance_two_are_a_posture() {
         let (a, b, c) =
             (Posture::at(&[0.1, 0.2, 0.3]), Posture::at(&[0.1005, 0.9, 0.8]), Posture::at(&[0.1, 0.2, -0.3]));
-        assert!(common_readings(&a, &b).is_empty());
-        assert_eq!(common_readings(&a, &c), [0, 1]);
+        assert!(common_readings(&a, &b, JOINTS_IN_COMMON).is_empty());
+        assert_eq!(common_readings(&a, &c, JOINTS_IN_COMMON), [0, 1]);
+        assert!(common_readings(&a, &c, 3).is_empty());
     }
 
     #[test]

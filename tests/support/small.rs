@@ -11,7 +11,8 @@ use robotcal::model::joint_terms::{GRAVITY_TERMS, JointTerm, Term};
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::problem::{Adjustment, State, Stop, TakenFrom, Tie, predict};
 use robotcal::problem::{
-    Image, Layout, Mark, MarkerObservation, MeasuredSeries, MeasuredStop, Names, Noise, PlateShape, Problem,
+    Image, JOINTS_IN_COMMON, Layout, Mark, MarkerObservation, MeasuredSeries, MeasuredStop, Names, Noise, PlateShape,
+    Problem,
 };
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use robotcal::urdf::{CarriedMass, Chain, Drive, Joint, JointKind};
@@ -284,6 +285,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
             mountings,
             cameras,
             stops,
+            fewest_in_common: JOINTS_IN_COMMON,
             images,
             instruments: Vec::new(),
             bodies: Vec::new(),

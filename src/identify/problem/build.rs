@@ -14,8 +14,9 @@ use crate::model::camera::Camera;
 use crate::model::plate_modes::DOT_GAIN;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{
-    Adjustment, DISPLACEMENT_SIZES, Family, HUBER, Image, ImageRejection, Layout, Mark, MarkerObservation,
-    MeasuredSeries, MeasuredStop, Names, Noise, PlateShape, Problem, State, Stop, Tie, intern, release_measured_scales,
+    Adjustment, DISPLACEMENT_SIZES, Family, HUBER, Image, ImageRejection, JOINTS_IN_COMMON, Layout, Mark,
+    MarkerObservation, MeasuredSeries, MeasuredStop, Names, Noise, PlateShape, Problem, State, Stop, Tie, intern,
+    release_measured_scales,
 };
 use crate::series::{Edge, Observation, Plate};
 
@@ -37,13 +38,15 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     let bodies = Bodies::of(series, &places);
     let runs = stops.last().map_or(0, |s| s.series + 1);
     let mut robot = robot.clone();
+    let readings = robot.chain.readings.len();
+    // A coordinate of a pose is read at many postures of the arm behind it.
+    let fewest_in_common = if robot.chain.pose_coordinates().is_some() { readings } else { JOINTS_IN_COMMON };
     if local_errors {
-        robot.terms.extend(local_terms(&stops, robot.chain.readings.len(), limits.stops_in_common));
+        robot.terms.extend(local_terms(&stops, readings, fewest_in_common, limits.stops_in_common));
         for stop in &mut stops {
             stop.local_share = stop.posture.as_ref().map(|p| local_share(&robot.terms, p)).unwrap_or_default();
         }
     }
-    let readings = robot.chain.readings.len();
     let state = State {
         robot,
         mountings: vec![Pose::identity(); pictured.mountings.len()],
@@ -72,6 +75,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         mountings: pictured.mountings,
         cameras: pictured.cameras,
         stops,
+        fewest_in_common,
         images: pictured.images,
         instruments: bodies.instruments,
         bodies: bodies.names,

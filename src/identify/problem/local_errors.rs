@@ -11,13 +11,18 @@ const BEYOND_CHANCE: usize = 3;
 const MOST_TERMS: usize = 300;
 
 /// Terms for the readings, those with the fewest first, that at least this share of the stops has in common with others, in the order of the readings.
-pub(super) fn local_terms(stops: &[Stop], readings: usize, least_share: f64) -> Vec<JointTerm> {
+pub(super) fn local_terms(
+    stops: &[Stop],
+    readings: usize,
+    fewest_in_common: usize,
+    least_share: f64,
+) -> Vec<JointTerm> {
     let on_robot: Vec<&Posture> = stops.iter().filter_map(|s| s.posture.as_ref()).collect();
     let mut pairs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); readings];
     let mut missed = vec![0_usize; readings];
     for (b, later) in on_robot.iter().enumerate() {
         for (a, earlier) in on_robot[..b].iter().enumerate() {
-            let [common, nearly] = related_readings(earlier, later);
+            let [common, nearly] = related_readings(earlier, later, fewest_in_common);
             common.into_iter().for_each(|r| pairs[r].push((a, b)));
             nearly.into_iter().for_each(|r| missed[r] += 1);
         }
@@ -65,6 +70,7 @@ mod tests {
 
     use super::*;
     use crate::model::robot::Posture;
+    use crate::problem::JOINTS_IN_COMMON;
 
     fn stops(count: usize, step: Option<f64>) -> Vec<Stop> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
@@ -78,7 +84,7 @@ mod tests {
 
     #[test]
     fn readings_that_agree_by_chance_are_no_places_of_their_own() {
-        assert!(local_terms(&stops(1500, None), 3, 0.5).is_empty());
-        assert_eq!(local_terms(&stops(1500, Some(0.1)), 3, 0.5).len(), 3 * 6);
+        assert!(local_terms(&stops(1500, None), 3, JOINTS_IN_COMMON, 0.5).is_empty());
+        assert_eq!(local_terms(&stops(1500, Some(0.1)), 3, JOINTS_IN_COMMON, 0.5).len(), 3 * 6);
     }
 }
