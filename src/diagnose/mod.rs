@@ -100,4 +100,4 @@ pub use steps::zero_moved::ZeroMoved;
 pub use tag_size::{TagsOff, tags_off};
 pub use tool_in_poses::{PosesOf, ToolInPoses};
 pub use undetermined::FlangeUndetermined;
-pub use zeros_off::ZeroOff;
+pub use zeros_off::{ZeroOff, zeros_off};

@@ -1,9 +1,10 @@
 //! Are the zeros of the joints, and the ways in which they count, those of the URDF?
 
 use super::kind::{CheckContext, Kind, Quantity, Subject};
+use crate::assess::Limits;
 use crate::error::Code;
 use crate::problem::Adjustment;
-use crate::urdf::{FoundOrigin, Joint, JointKind};
+use crate::urdf::{Chain, FoundOrigin, Joint, JointKind};
 
 /// A joint whose zero was found elsewhere before the fit, or that counts the other way.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,11 +22,15 @@ pub struct ZeroOff {
 }
 
 pub(super) fn check(fit: &Adjustment, setting: &CheckContext) -> Vec<ZeroOff> {
-    let chain = &fit.state.robot.chain;
+    zeros_off(&fit.state.robot.chain, setting.limits)
+}
+
+/// Joints whose zeros were found far from those of the robot description, or that count the other way.
+pub fn zeros_off(chain: &Chain, limits: &Limits) -> Vec<ZeroOff> {
     let is_at_an_end = |reading: usize| reading == 0 || reading + 1 == chain.readings.len();
     let of = |joint: &Joint| match (joint.found, joint.drive) {
         (Some(FoundOrigin::Zero { offset, is_reversed }), Some(drive))
-            if is_reversed || offset.abs() > setting.limits.zeros_off_rad =>
+            if is_reversed || offset.abs() > limits.zeros_off_rad =>
         {
             let offset_is_told = !is_at_an_end(drive.reading);
             Some(ZeroOff { joint: joint.name.clone(), offset, offset_is_told, kind: joint.kind, is_reversed })

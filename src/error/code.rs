@@ -383,7 +383,7 @@ codes! {
         FramesUndetermined "frames_undetermined" "touches do not determine tool and work object together",
         FrameWeak "frame_weak" "a direction of tool or work object is hardly told",
         TouchesLeftOut "touches_left_out" "touches disagree with the others, and are left out",
-        ReadingsOfOtherZeros "readings_of_other_zeros" "touches fit with their readings taken on the other side of the mastering",
+        ReadingsOfOtherZeros "readings_of_other_zeros" "touches, or a series that judges a robot, fit with their readings taken on the other side of the mastering",
         TouchesScatter "touches_scatter" "touches scatter more than their stated sigma says",
         TouchesExact "touches_exact" "touches have the joint values of their plan, or fit far better than their stated sigma lets them: they were computed, not made",
         RobotContradicted "robot_contradicted" "touches say of the robot what the solution excludes",

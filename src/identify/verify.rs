@@ -4,10 +4,12 @@ use super::controller::computed_postures::{Before, told_by_seen};
 use super::joint_fit::unpredicted::nothing_held_out;
 use super::options::JointNoise;
 use super::photogrammetry::free_poses::free_poses_of;
-use super::start::robot::{StartGiven, start_robot};
+use super::start::robot::{StartGiven, ZerosElsewhere, start_robot};
 use super::start::turns;
+use super::start::zeros::other_zeros;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
+use crate::diagnose::{ZeroOff, zeros_off};
 use crate::error::{Code, Error, Result};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries};
@@ -24,6 +26,36 @@ pub struct JudgedImage {
     pub posture: usize,
     /// Its error.
     pub error: ImageError,
+}
+
+/// What a series says of a robot that it was not fitted to.
+#[derive(Debug, Clone, PartialEq)]
+pub enum JudgedSeries {
+    /// The errors of all images.
+    Images(Vec<JudgedImage>),
+    /// Its readings and the images do not belong together, and do with other zeros of its joints.
+    OtherZeros(Box<RobotOfOtherZeros>),
+}
+
+impl JudgedSeries {
+    /// Its images; none with the zeros as they are where others are needed.
+    pub fn into_images(self) -> Vec<JudgedImage> {
+        match self {
+            Self::Images(images) => images,
+            Self::OtherZeros(_) => Vec::new(),
+        }
+    }
+}
+
+/// A robot with other zeros than those of the one that is judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotOfOtherZeros {
+    /// With these zeros.
+    pub robot: Robot,
+    /// Which they are.
+    pub zeros: Vec<ZeroOff>,
+    /// Median misfit of readings and images without them, rad + m.
+    pub misfit: f64,
 }
 
 /// Series with readings that were computed from poses of a controller in the postures that the images tell with this robot: a better one tells
@@ -43,18 +75,30 @@ fn with_robot_held(start: &mut Adjustment) -> Result<()> {
     Ok(())
 }
 
-/// Errors of all images on the robot that a fixed robot model leaves.
+/// Errors of all images on the robot that a fixed robot model leaves, with the zeros of its joints as they are.
 ///
 /// Joint noise is a variance component of its own for each model, so that a bad model does not bend camera and plate. Poses of a controller are
-/// taken in the postures that the images tell with this robot.
+/// taken in the postures that the images tell with this robot. Other zeros are looked for only where readings and images do not belong together.
 ///
 /// # Errors
 /// Input errors of the series; unsolved where the data do not determine camera or hand-camera offset.
-pub fn verify_series(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) -> Result<Vec<JudgedImage>> {
+pub fn verify_series(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) -> Result<JudgedSeries> {
     let series = in_told_postures(robot, series, limits);
     let (mut adjustment, free, mut starts) = free_poses_of(robot, &series, limits, with_robot_held)?;
-    start_robot(&mut adjustment, &free, StartGiven { series: &series, groups: &[], limits }, &mut starts)?;
+    let given = StartGiven { zeros: ZerosElsewhere::Left, ..StartGiven::of(&series, limits) };
+    if let Err(error) = start_robot(&mut adjustment, &free, given, &mut starts) {
+        let found = other_zeros(&adjustment, &free, limits).ok_or(error)?;
+        let zeros = zeros_off(&found.chain, limits);
+        let robot = Robot { chain: found.chain, ..adjustment.state.robot };
+        let other = RobotOfOtherZeros { robot, zeros, misfit: found.as_described };
+        return Ok(JudgedSeries::OtherZeros(Box::new(other)));
+    }
     adjustment.tie_to_readings(false);
+    Ok(JudgedSeries::Images(held_out(adjustment, limits)?))
+}
+
+/// Errors of images that camera and plate were not fitted to.
+fn held_out(adjustment: Adjustment, limits: &Limits) -> Result<Vec<JudgedImage>> {
     let outcome = estimate_components(adjustment, &ComponentOptions::default());
     if outcome.status != Status::Converged {
         return Err(Error::new(

@@ -141,6 +141,39 @@ fn a_model_that_misses_more_than_its_solution_states_is_not_trusted() {
     assert!(mm > 1.0, "{mm}");
 }
 
+/// What a robot misses is what it misses with its own zeros: those that would fit are said, and are not its merit. A robot that others are compared
+/// with is not judged.
+#[test]
+fn a_model_is_judged_with_the_zeros_that_it_has() {
+    let nominal = kr6_urdf();
+    let urdf = root().join("reports/kr6_small/kuka_kr6_r900.calibrated.urdf");
+    let folder = tempfile::tempdir().unwrap();
+    let same = simulated(&urdf, &folder.path().join("same"), "none", &[]);
+    // Where its third joint is at zero, another one turns the links behind it.
+    let text = std::fs::read_to_string(&nominal).unwrap();
+    let own = "<origin xyz=\"0.455 0 0\" rpy=\"0 0 0\"/>";
+    assert_eq!(text.matches(own).count(), 1);
+    let turned = folder.path().join("turned.urdf");
+    std::fs::write(&turned, text.replace(own, "<origin xyz=\"0.455 0 0\" rpy=\"0 0.35 0\"/>")).unwrap();
+    let (exit, said, mm) = verdict(&urdf, &same, &["--nominal", turned.to_str().unwrap()]);
+    assert_eq!((exit, said), (Some(0), vec![]));
+    assert!(mm < 0.1, "{mm}");
+    let shifted = simulated(&urdf, &folder.path().join("shifted"), "none", &[]);
+    with_other_zero(&shifted, "joint_a2", 25.0);
+    with_other_zero(&shifted, "joint_a3", -12.0);
+    for flags in [&["--nominal", nominal.to_str().unwrap()][..], &[]] {
+        let (exit, said, mm) = verdict(&urdf, &shifted, flags);
+        assert_eq!((exit, said), (Some(1), vec![Code::ZeroOff; 2]));
+        assert!(mm.is_nan(), "{mm}");
+    }
+    // Nor is it refused for want of a figure: by less than keeps camera and plate from being fitted it misses by that.
+    let little = simulated(&urdf, &folder.path().join("little"), "none", &[]);
+    with_other_zero(&little, "joint_a4", 3.0);
+    let (exit, said, mm) = verdict(&urdf, &little, &[]);
+    assert_eq!(exit, Some(1));
+    assert!(said.contains(&Code::StatedExceeded) && mm > 1.0, "{said:?} {mm}");
+}
+
 /// The same stops of the same robot, measured again.
 fn measured_again(series: &Path, into: &Path) -> PathBuf {
     observations_rewritten(series, into, 1e-3)
@@ -181,6 +214,10 @@ fn readings_to_a_mastered_robot_are_taken_one_way_for_all_folders() {
     let corrected = out.join("kuka_kr6_r900.calibrated.urdf");
     let again = measured_again(&series, &folder.path().join("again"));
     let also = again.to_str().unwrap();
+    // Others than those of the result are taken with the offsets entered: where nobody entered them, that is what is said.
+    let (exit, said, _) = verdict(&corrected, &again, &[]);
+    assert_eq!(exit, Some(1));
+    assert!(said.contains(&Code::ReadingsOfOtherZeros) && !said.contains(&Code::ZeroMoved), "{said:?}");
     let judged = |flags: &[&str]| verdict(&corrected, &series, &[flags, &["--nominal", urdf]].concat());
     let (_, _, own) = judged(&[]);
     let (_, _, entered) = judged(&["--readings", "after"]);

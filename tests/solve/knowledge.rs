@@ -641,7 +641,7 @@ fn another_series_tells_a_calibrated_robot_from_the_nominal_one() {
     second.name = "second".into();
     let solution = identify(chain(), &[first], &Options { model: RobotModel::Rigid, ..Options::default() }).unwrap();
     let rms = |robot: &Robot| {
-        let judged = verify_series(robot, std::slice::from_ref(&second), &Limits::default()).unwrap();
+        let judged = verify_series(robot, std::slice::from_ref(&second), &Limits::default()).unwrap().into_images();
         let (sum, count) = judged.iter().fold((0.0, 0.0), |(s, c), i| (s + i.error.mm2, c + i.error.count));
         (sum / f64::max(count, 1.0)).sqrt()
     };

@@ -2,7 +2,8 @@
 //! measurements.
 //!
 //! `frames_text` is what `frames` prints; `compensate_frames` and `compensate_models` say what is known of the robots of a program; `verify` reads the flags of `verify_args`, takes what was stated
-//! from `verify_stated`, judges points itself and series in `verify_series`, and ends in `verify_verdict`; `zeros` says which controller readings are of.
+//! from `verify_stated`, judges points itself and series in `verify_series`, and ends in `verify_verdict`; `verify_zeros` tells zeros
+//! by which a model misses; `zeros` says which controller readings are of.
 
 pub mod compensate;
 mod compensate_frames;
@@ -14,4 +15,5 @@ pub mod verify_args;
 mod verify_series;
 mod verify_stated;
 mod verify_verdict;
+mod verify_zeros;
 mod zeros;

@@ -9,15 +9,19 @@ use super::compensate_models::not_given;
 use super::verify_args::VerifyArgs;
 use super::verify_stated::Stated;
 use super::verify_verdict::{Gain, Measured, Reasons, of_series};
+use super::verify_zeros::{read_otherwise, words, zero_off};
+use super::zeros::Zeros;
 use crate::assess::{Limits, Ratio, bootstrap_ratio, by_cluster, root_mean_square};
 use crate::calibration::{Ends, Inputs, Observed};
 use crate::cli::Verdict;
 use crate::cli::flags::recording::RecordingArgs;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::say::say_line;
+use crate::diagnose::Finding;
 use crate::error::{Code, Error, Result};
 use crate::identify::{
-    JudgedImage, Options, RobotModel, Selection, identify, in_told_postures, postures_are_computed, verify_series,
+    JudgedImage, JudgedSeries, Options, RobotModel, RobotOfOtherZeros, Selection, identify, in_told_postures,
+    postures_are_computed, verify_series,
 };
 use crate::model::robot::Robot;
 use crate::output::compensated;
@@ -38,11 +42,15 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
         require_readings(&inputs)?;
         let model = Model::of(args, inputs.chain.clone())?;
         let Observed { series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
-        let series = with_added(series, &missing(args, &model, &files)?);
-        let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
+        let zeros = zeros(args, &model, &files)?;
+        let seen = Seen { series: &with_added(series, &missing(zeros.as_ref())), files: &files, zeros: zeros.as_ref() };
+        let images = match judged((&model.robot, &args.urdf), seen.series, &model.limits)? {
+            JudgedSeries::Images(images) => images,
+            JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
+        };
         let images: Vec<&JudgedImage> = images.iter().collect();
         say_line!("{}", line("model", &args.urdf, &images));
-        return Ok(weigh(args, &model, &Seen { series: &series, files: &files, images: &images }, None).verdict());
+        return Ok(weigh(args, &model, (&seen, &images), None).verdict());
     };
     // Poses of a controller are those of the model that is in it, whichever robot is judged by them.
     let nominal_inputs = read(file)?;
@@ -50,16 +58,21 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let model = Model::of(args, judged_inputs.chain)?;
     let Observed { chain, series, files, .. } =
         nominal_inputs.with_recordings(&options)?.observe(&model.limits, &progress::of_series())?;
-    let missing = missing(args, &model, &files)?;
+    let zeros = zeros(args, &model, &files)?;
+    let missing = missing(zeros.as_ref());
     let series = in_told_postures(&model.robot, &with_added(series, &missing), &model.limits);
+    let seen = Seen { series: &series, files: &files, zeros: zeros.as_ref() };
+    let images = match judged((&model.robot, &args.urdf), &series, &model.limits)? {
+        JudgedSeries::Images(images) => images,
+        JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
+    };
     let as_shown: Vec<f64> = missing.iter().map(|offset| -offset).collect();
-    let robot = Robot::nominal(chain);
-    let nominal = judged((&robot, file), &with_added(series.clone(), &as_shown), &model.limits)?;
-    let images = judged((&model.robot, &args.urdf), &series, &model.limits)?;
+    let (robot, nominal) =
+        compared((Robot::nominal(chain), file), &with_added(series.clone(), &as_shown), &model.limits)?;
     let (images, nominal) = of_both(&images, &nominal);
     let ratio = compare(args, file, &images, &nominal)?;
     let gain = Gain { ratio, nominal: &robot, of: "images", at: at_images(&model.robot, &series) };
-    Ok(weigh(args, &model, &Seen { series: &series, files: &files, images: &images }, Some(gain)).verdict())
+    Ok(weigh(args, &model, (&seen, &images), Some(gain)).verdict())
 }
 
 /// What is judged, with what its solution states and the limits with which that was found.
@@ -79,11 +92,16 @@ impl Model {
     }
 }
 
-/// What is to be added to readings so that they are of the controller to which the model belongs, rad or m; says which they are taken for.
-fn missing(args: &VerifyArgs, model: &Model, files: &[InputFile]) -> Result<Vec<f64>> {
+/// Which controller readings are of; says so.
+fn zeros(args: &VerifyArgs, model: &Model, files: &[InputFile]) -> Result<Option<Zeros>> {
     let zeros = args.readings.beside(model.stated.as_ref(), &args.urdf, files)?;
     zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
-    Ok(zeros.map_or_else(Vec::new, |zeros| zeros.missing))
+    Ok(zeros)
+}
+
+/// What is to be added to readings so that they are of the controller to which the model belongs, rad or m.
+fn missing(zeros: Option<&Zeros>) -> Vec<f64> {
+    zeros.map_or_else(Vec::new, |zeros| zeros.missing.clone())
 }
 
 /// The series with this added to all readings, rad or m, those of other postures included.
@@ -95,32 +113,70 @@ fn with_added(mut series: Vec<MeasuredSeries>, offsets: &[f64]) -> Vec<MeasuredS
     series
 }
 
-/// What was measured, and how the model does there.
+/// What was measured.
 struct Seen<'a> {
     series: &'a [MeasuredSeries],
     files: &'a [InputFile],
-    images: &'a [&'a JudgedImage],
+    zeros: Option<&'a Zeros>,
 }
 
 /// The model beside what its solution states, and what the series shows of itself where it misses more.
-fn weigh(args: &VerifyArgs, model: &Model, seen: &Seen<'_>, gain: Option<Gain<'_>>) -> Reasons {
-    let Seen { series, files, images } = *seen;
+fn weigh(
+    args: &VerifyArgs,
+    model: &Model,
+    (seen, images): (&Seen<'_>, &[&JudgedImage]),
+    gain: Option<Gain<'_>>,
+) -> Reasons {
     let Model { robot, stated, limits } = model;
     let urdf = &args.urdf;
-    let expected = stated.as_ref().and_then(|s| Some((s, s.at_stops(series)?)));
+    let expected = stated.as_ref().and_then(|s| Some((s, s.at_stops(seen.series)?)));
     let rms_m = 1e-3 * root_mean_square(&units(images));
     let is_unexplained = expected.is_none() && rms_m > 1e-3 * limits.flange_sigma_mm;
     let mut reasons = Reasons::default();
     reasons.add(&Measured { urdf, rms_m, stated: expected, gain }, limits);
-    if let Some(stated) = stated.as_ref().filter(|s| s.was_fitted_to(files, series)) {
+    if let Some(stated) = stated.as_ref().filter(|s| s.was_fitted_to(seen.files, seen.series)) {
         reasons.add_own(urdf, stated);
     }
     let side = Side { robot, urdf, solution: None };
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     if reasons.misses() || is_unexplained {
-        reasons.findings.extend(shown_by_series(robot.chain.clone(), series, limits));
+        match by_other_readings(urdf, model, seen) {
+            Some(found) => reasons.findings.push(found),
+            None => reasons.findings.extend(shown_by_series(robot.chain.clone(), seen.series, limits)),
+        }
     }
     reasons
+}
+
+/// A model that is judged with its own zeros, which do not fit: there is no figure of it, and which zeros would fit is said.
+fn of_other_zeros(args: &VerifyArgs, model: &Model, seen: &Seen<'_>, other: &RobotOfOtherZeros) -> Result<Reasons> {
+    let urdf = &args.urdf;
+    let with_these = judged((&other.robot, urdf), seen.series, &model.limits)?.into_images();
+    say_line!(
+        "model     {}: as it is, readings and images miss by {:.0} (median, mm plus mrad): nothing can be fitted",
+        urdf.display(),
+        1e3 * other.misfit
+    );
+    say_line!("{}", line("zeros", urdf, &with_these.iter().collect::<Vec<_>>()) + ", with those that fit");
+    let mut reasons = Reasons::default();
+    let subject = urdf.display().to_string();
+    match by_other_readings(urdf, model, seen) {
+        Some(found) => reasons.findings.push(found),
+        None => reasons.findings.extend(other.zeros.iter().map(|zero| zero_off(zero, &subject))),
+    }
+    let side = Side { robot: &model.robot, urdf, solution: None };
+    reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
+    Ok(reasons)
+}
+
+/// The series with its readings taken the other way, where the model then misses no more than it may.
+fn by_other_readings(urdf: &Path, model: &Model, seen: &Seen<'_>) -> Option<FileFinding> {
+    let (zeros, stated) = (seen.zeros?, model.stated.as_ref()?);
+    let series = with_added(seen.series.to_vec(), &zeros.instead());
+    let images = verify_series(&model.robot, &series, &model.limits).ok()?.into_images();
+    let images: Vec<&JudgedImage> = images.iter().collect();
+    let rms_m = (!images.is_empty()).then(|| 1e-3 * root_mean_square(&units(&images)))?;
+    read_otherwise((urdf, stated), (zeros, rms_m), &series, &model.limits)
 }
 
 /// Readings of the stops, and a point as far from the tip as what stands still, along no axis.
@@ -137,7 +193,33 @@ fn shown_by_series(chain: Chain, series: &[MeasuredSeries], limits: &Limits) -> 
     let selection = Selection { fix: vec![ROBOT.to_owned()], ..Selection::default() };
     let options = Options { model: RobotModel::Rigid, selection, limits: *limits, ..Options::default() };
     let found = identify(chain, series, &options);
-    found.map_or_else(|_| Vec::new(), |solution| solution.findings.iter().filter_map(of_series).collect())
+    let of = |found: &Finding| match found {
+        Finding::ZeroOff(zero) => Some(zero_off(zero, &found.notice().place)),
+        _ => of_series(found),
+    };
+    found.map_or_else(|_| Vec::new(), |solution| solution.findings.iter().filter_map(of).collect())
+}
+
+/// The robot that a model is compared with, and its images. It is there to compare with and is not judged: where its zeros do not fit, it is taken
+/// with those that do, which is said.
+fn compared(
+    (robot, file): (Robot, &Path),
+    series: &[MeasuredSeries],
+    limits: &Limits,
+) -> Result<(Robot, Vec<JudgedImage>)> {
+    let other = match judged((&robot, file), series, limits)? {
+        JudgedSeries::Images(images) => return Ok((robot, images)),
+        JudgedSeries::OtherZeros(other) => *other,
+    };
+    let found: Vec<String> = other.zeros.iter().map(words).collect();
+    say_line!(
+        "zeros     {}: as it is, readings and images miss by {:.0} (median, mm plus mrad); compared with it where {}",
+        file.display(),
+        1e3 * other.misfit,
+        found.join(", and ")
+    );
+    let images = judged((&other.robot, file), series, limits)?.into_images();
+    Ok((other.robot, images))
 }
 
 /// Name of all parameters of the robot.
@@ -189,7 +271,7 @@ fn compare(args: &VerifyArgs, file: &Path, model: &[&JudgedImage], nominal: &[&J
     })
 }
 
-fn judged((robot, file): (&Robot, &Path), series: &[MeasuredSeries], limits: &Limits) -> Result<Vec<JudgedImage>> {
+fn judged((robot, file): (&Robot, &Path), series: &[MeasuredSeries], limits: &Limits) -> Result<JudgedSeries> {
     let bar = progress::bar(1, &file.display().to_string());
     let found = verify_series(robot, series, limits);
     bar.finish_and_clear();

@@ -1,5 +1,6 @@
 //! What speaks for a model and what against it, and the verdict.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::Vector3;
@@ -179,8 +180,9 @@ impl Reasons {
     /// Says all of it.
     pub fn verdict(self) -> Verdict {
         say::findings(&self.findings);
-        let gates: Vec<&str> =
+        let mut gates: Vec<&str> =
             self.findings.iter().filter(|f| f.weight == Weight::Gate).map(|f| f.code.name()).collect();
+        gates.dedup();
         let is_own = self.has(Code::OwnMeasurement);
         let doubt = [Code::StatedExceeded, Code::ModelsNotTold].into_iter().find(|code| self.has(*code));
         let is_doubted = doubt.is_some() || !self.doubts.is_empty();
@@ -199,7 +201,7 @@ impl Reasons {
 }
 
 /// More than a right model misses by, as far beyond that as a good robot repeats.
-fn exceeded(
+pub(super) fn exceeded(
     (urdf, rms_m): (&Path, f64),
     solution: &Path,
     expected: Expectation,
@@ -237,6 +239,10 @@ pub(super) fn of_series(found: &Finding) -> Option<FileFinding> {
         _ => return None,
     };
     let series = found.notice().place;
-    let quantities = found.quantities().into_iter().map(|q| (format!("{}_{}", q.name, q.unit), q.value)).collect();
-    Some(FileFinding { code: found.code(), weight, subject: series, quantities, text })
+    Some(FileFinding { code: found.code(), weight, subject: series, quantities: numbers_of(found), text })
+}
+
+/// Its numbers by name, the unit at the end of the name.
+pub(super) fn numbers_of(found: &Finding) -> BTreeMap<String, f64> {
+    found.quantities().into_iter().map(|q| (format!("{}_{}", q.name, q.unit), q.value)).collect()
 }

@@ -111,7 +111,7 @@ impl Compared {
                 (start, free, Vec::new())
             }
         };
-        start_robot(&mut adjustment, &free, StartGiven { series, groups: &[], limits }, &mut verdicts).ok()?;
+        start_robot(&mut adjustment, &free, StartGiven::of(series, limits), &mut verdicts).ok()?;
         // Where they do not fit, the joint fit says why, and the images tell by themselves.
         let bodies_fit = start_bodies(&mut adjustment, series, limits).is_ok();
         let layout = &adjustment.problem.layout;

@@ -95,8 +95,7 @@ pub(in crate::identify) fn fit_model(
     let mut starts = left.verdicts.clone();
     let on_robot = start.problem.used_on_robot().count();
     check_on_robot(&start.problem, on_robot, series)?;
-    let aside =
-        start_robot(&mut start, free, StartGiven { series, groups: &[], limits: &options.limits }, &mut starts)?;
+    let aside = start_robot(&mut start, free, StartGiven::of(series, &options.limits), &mut starts)?;
     start_bodies(&mut start, series, &options.limits)?;
     let (mut ended, before) = {
         let _stage = stage("joint fit");

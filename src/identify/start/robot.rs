@@ -11,12 +11,10 @@ use crate::fit::FreePoses;
 use crate::geom::log_so3;
 use crate::identify::bodies::rows_of::rows_of_images;
 use crate::identify::mistakes::breaks::broken;
-use crate::identify::mistakes::suspects::{Suspects, best_scale, directions_alone, left_by_scale};
+use crate::identify::mistakes::suspects::Suspects;
+use crate::identify::start::zeros::place_zeros;
 use crate::identify::start_verdict::{StartReached, StartVerdict};
-use crate::init::{
-    HandEye, HandEyeStart, PosePair, SeenStop, Zeros, bases, hand_eye_misfit, shah, solve_hand_eye, solve_slopes,
-    solve_zeros,
-};
+use crate::init::{HandEye, HandEyeStart, PosePair, SeenStop, bases, hand_eye_misfit, solve_hand_eye};
 use crate::linalg::median;
 use crate::linalg::symmetric_eigen;
 use crate::model::one_direction::turns_about_one_direction;
@@ -37,8 +35,26 @@ pub(in crate::identify) struct StartGiven<'a> {
     pub series: &'a [MeasuredSeries],
     /// All images by mounting and placement, with what they and their readings say; filled in by the start.
     pub groups: &'a [Vec<(usize, PosePair)>],
+    /// What becomes of zeros that are elsewhere than those of the robot.
+    pub zeros: ZerosElsewhere,
     /// Limits.
     pub limits: &'a Limits,
+}
+
+impl<'a> StartGiven<'a> {
+    /// That of series whose robot is given the zeros that they tell.
+    pub fn of(series: &'a [MeasuredSeries], limits: &'a Limits) -> Self {
+        Self { series, groups: &[], zeros: ZerosElsewhere::Placed, limits }
+    }
+}
+
+/// Zeros of joints elsewhere than those of the robot, where readings and images fit with these and then only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::identify) enum ZerosElsewhere {
+    /// The robot is given them.
+    Placed,
+    /// It stays as it is, and does not fit.
+    Left,
 }
 
 /// Fills in mountings and placements; sets images aside that do not fit their readings, and returns which.
@@ -49,7 +65,9 @@ pub(in crate::identify) fn start_robot(
     verdicts: &mut Vec<StartVerdict>,
 ) -> Result<Vec<usize>> {
     place_bases(adjustment, free)?;
-    place_zeros(adjustment, free, given.limits);
+    if given.zeros == ZerosElsewhere::Placed {
+        place_zeros(adjustment, free, given.limits);
+    }
     let mut aside = Vec::new();
     let robot = &adjustment.state.robot;
     let pairs = |seen: Vec<(usize, SeenStop)>| seen.into_iter().map(|(i, stop)| (i, stop.pair(robot))).collect();
@@ -118,60 +136,6 @@ fn place_bases(adjustment: &mut Adjustment, free: &FreePoses) -> Result<()> {
     Ok(())
 }
 
-/// Gives joints other zeros, and one of them the other direction, where readings and images fit then and only then. A single mistake without other
-/// zeros is left to be named.
-fn place_zeros(adjustment: &mut Adjustment, free: &FreePoses, limits: &Limits) {
-    let robot = &adjustment.state.robot;
-    let is_found = robot.chain.joints.iter().any(|j| j.found.is_some());
-    if is_found || robot.chain.base_moves() || robot.chain.pose_coordinates().is_some() {
-        return;
-    }
-    let stops = free.most_seen_stops(&adjustment.problem, used(adjustment));
-    if stops.len() < limits.zeros_images {
-        return;
-    }
-    let pairs: Vec<PosePair> = stops.iter().map(|stop| stop.pair(robot)).collect();
-    // The closed form of all images is enough to see that nothing is wrong.
-    let of_all = shah(&pairs).map_or(f64::INFINITY, |s| s.median_error(&pairs));
-    if of_all < limits.suspicious_misfit {
-        return;
-    }
-    let as_described = hand_eye_misfit(&pairs);
-    if as_described < limits.suspicious_misfit {
-        return;
-    }
-    // A joint that stands upside down with all behind it is the same arm with zeros half a turn off.
-    let is_plausible = |z: &Zeros| z.offsets.iter().all(|o| o.abs() < limits.zeros_most_rad);
-    let mut tried = solve_zeros(robot, &stops).into_iter().filter(is_plausible);
-    let Some(best) = tried.next() else { return };
-    let otherwise = tried.next().map_or(f64::INFINITY, |next| next.left).min(as_described);
-    let is_far = best.offsets.iter().any(|o| o.abs() > limits.zeros_off_rad);
-    let explains = best.left < limits.zeros_explain && best.left < limits.zeros_explain_share * otherwise;
-    // Zeros of parallel joints whose sum vanishes turn nothing, and look like links or a plate of another size.
-    let by_scale = || best_scale(&pairs).and_then(|scale| left_by_scale(&pairs, scale)).unwrap_or(f64::INFINITY);
-    let look_like_lengths = || {
-        best.left < limits.suspicious_misfit
-            && directions_alone(&pairs, limits).is_some()
-            && best.left < limits.zeros_explain_share * by_scale()
-    };
-    // Zeros alone are a matter of the fit as long as it starts.
-    let is_needed = best.reversed.is_some() || as_described > limits.hand_eye_spread || look_like_lengths();
-    // A reading that is wrong by a ratio looks like other zeros, as far as it stays on one side of its own.
-    let by_ratio = || {
-        let tried = solve_slopes(robot, &stops).and_then(|slopes| slopes.tried.into_iter().next());
-        tried.is_some_and(|slope| slope.left < limits.zeros_explain_share * best.left)
-    };
-    if !(is_far && explains && is_needed) || by_ratio() {
-        return;
-    }
-    let mut chain = robot.chain.clone();
-    for (reading, &offset) in best.offsets.iter().enumerate() {
-        let Some(moved) = chain.with_zero(reading, offset, best.reversed == Some(reading)) else { return };
-        chain = moved;
-    }
-    adjustment.state.robot.chain = chain;
-}
-
 /// Of the solutions that single images give, the one that all images like best.
 fn closest(poses: &[PosePair], solution: impl Fn(&PosePair) -> HandEye) -> HandEye {
     let median = |s: &HandEye| s.median_error(poses);
@@ -192,7 +156,7 @@ fn closed_form(
     poses: &[PosePair],
     (mounting, placement): (usize, usize),
     of: &str,
-    StartGiven { series, groups, limits }: StartGiven<'_>,
+    StartGiven { series, groups, limits, .. }: StartGiven<'_>,
     verdicts: &mut Vec<StartVerdict>,
 ) -> Result<HandEye> {
     let fewest = limits.hand_eye_images;
@@ -243,7 +207,7 @@ fn check_shared(
     pairs: &[(usize, PosePair)],
     shared: &HandEye,
     of: &str,
-    StartGiven { series, groups, limits }: StartGiven<'_>,
+    StartGiven { series, groups, limits, .. }: StartGiven<'_>,
 ) -> Result<()> {
     let poses: Vec<PosePair> = pairs.iter().map(|(_, pair)| *pair).collect();
     let misfit = shared.median_error(&poses);
