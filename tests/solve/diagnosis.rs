@@ -67,6 +67,24 @@ fn zeros_of_parallel_joints_that_cancel_are_found() {
     }
 }
 
+/// The fit would take up the smaller ones by the origins of two joints, and name these.
+#[test]
+fn the_zero_of_one_joint_is_found_from_the_size_on_that_is_no_matter_of_the_fit() {
+    let chain = kr6();
+    let world = series(&WorldRequest { images: 30, ..request(&chain) }).unwrap();
+    for (reading, degrees) in [(1, 8.0), (2, 8.0), (1, -10.0), (2, 30.0), (4, 6.0)] {
+        let (mut series, off) = (measured(&world, &chain), f64::to_radians(degrees));
+        series.stops.iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| q[reading] += off);
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        let solution = identify(chain.clone(), &[series], &options).unwrap();
+        let zeros = solution.findings.iter().filter_map(|f| if let Finding::ZeroOff(z) = f { Some(z) } else { None });
+        let zeros: Vec<(&str, f64)> = zeros.map(|zero| (zero.joint.as_str(), zero.offset)).collect();
+        println!("{degrees} deg of {}: {zeros:?}", chain.readings[reading]);
+        assert_eq!(zeros.len(), 1, "{zeros:?}");
+        assert!(zeros[0].0 == chain.readings[reading] && (zeros[0].1 + off).abs() < 0.03, "{zeros:?}");
+    }
+}
+
 #[test]
 fn the_size_of_a_plate_that_does_not_fit_is_told() {
     let chain = kr6();

@@ -55,15 +55,17 @@ pub(in crate::identify) fn other_zeros(
     let otherwise = tried.next().map_or(f64::INFINITY, |next| next.left).min(as_described);
     let is_far = best.offsets.iter().any(|o| o.abs() > limits.zeros_off_rad);
     let explains = best.left < limits.zeros_explain && best.left < limits.zeros_explain_share * otherwise;
-    // Zeros of parallel joints whose sum vanishes turn nothing, and look like links or a plate of another size.
+    // What is a matter of no fit and of no other size: zeros that leave nothing suspicious. Those of parallel joints whose sum vanishes turn nothing, and look
+    // like links or a plate of another size.
     let by_scale = || best_scale(&pairs).and_then(|scale| left_by_scale(&pairs, scale)).unwrap_or(f64::INFINITY);
-    let look_like_lengths = || {
+    let are_clear = || {
+        let explain_all = best.left < limits.mistake_explains * as_described;
         best.left < limits.suspicious_misfit
-            && directions_alone(&pairs, limits).is_some()
+            && (explain_all || directions_alone(&pairs, limits).is_some())
             && best.left < limits.zeros_explain_share * by_scale()
     };
-    // Zeros alone are a matter of the fit as long as it starts.
-    let is_needed = best.reversed.is_some() || as_described > limits.hand_eye_spread || look_like_lengths();
+    // Others are a matter of the fit as long as it starts.
+    let is_needed = best.reversed.is_some() || as_described > limits.hand_eye_spread || are_clear();
     // A reading that is wrong by a ratio looks like other zeros, as far as it stays on one side of its own.
     let by_ratio = || {
         let tried = solve_slopes(robot, &stops).and_then(|slopes| slopes.tried.into_iter().next());
