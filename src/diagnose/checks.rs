@@ -29,6 +29,8 @@ pub enum Stage {
     Fit(fn(&Fit, &Accuracy, &CheckContext) -> Vec<Finding>),
     /// After it is known how far the result can be trusted.
     Uncertainty(fn(&Uncertainty, &Accuracy, &CheckContext) -> Vec<Finding>),
+    /// Then, with the fit.
+    Judged(fn(&Fit, &Uncertainty, &Accuracy, &CheckContext) -> Vec<Finding>),
 }
 
 /// One check.
@@ -157,7 +159,10 @@ pub const CHECKS: &[Check] = &[
     check("measurement_scatter", Stage::Fit(|a, b, s| found(measurement_scatter::check(a, b, s)))),
     check("left_out_observations", Stage::LeftOut(|a, s| found(left_out_observations::check(a, s)))),
     check("mirror_image", Stage::Fit(|a, b, s| found(mirror_image::check(a, b, s)))),
-    check("no_gain", Stage::Fit(|a, b, s| found(no_gain::check(a, b, s)))),
+    Check {
+        explains: |_, other| matches!(other, Finding::SmallGain(_)),
+        ..check("no_gain", Stage::Judged(|a, u, b, s| found(no_gain::check(a, u, b, s))))
+    },
     check("zeros_off", Stage::LeftOut(|a, s| found(zeros_off::check(a, s)))),
     Check {
         // The robot takes up what a plate of another size leaves, and what it cannot looks like noise.
@@ -259,9 +264,10 @@ impl<'a> Diagnosis<'a> {
     }
 
     /// Checks of how far the result can be trusted.
-    pub fn after_uncertainty(&mut self, uncertainty: &Uncertainty, accuracy: &Accuracy) {
+    pub fn after_uncertainty(&mut self, fit: &Fit, uncertainty: &Uncertainty, accuracy: &Accuracy) {
         self.run(|stage, setting| match stage {
             Stage::Uncertainty(check) => Some(check(uncertainty, accuracy, setting)),
+            Stage::Judged(check) => Some(check(fit, uncertainty, accuracy, setting)),
             _ => None,
         });
     }

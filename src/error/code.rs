@@ -365,7 +365,7 @@ codes! {
         LooseMounting "loose_mounting" "camera or plate is loose on its mount",
         MarkerOff "marker_off" "a marker is far from where the plate file says",
         TagsOff "tags_off" "the tags of a plate have another size beside their distance than the plate file says",
-        NoGain "no_gain" "the calibrated robot is no better than the nominal one",
+        NoGain "no_gain" "the calibrated robot is not shown to be better than the nominal one",
         SmallGain "small_gain" "the calibrated robot is hardly better than the nominal one",
         OddImage "odd_image" "an image is predicted far worse than the others",
         ParameterOff "parameter_off" "a parameter is far from what robots usually have",

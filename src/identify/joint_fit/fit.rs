@@ -185,7 +185,7 @@ impl JointFit {
             let _stage = stage("uncertainty");
             judge(&mut fit, estimated, before, limits)?
         };
-        diagnosis.after_uncertainty(&uncertainty, &accuracy);
+        diagnosis.after_uncertainty(&fit, &uncertainty, &accuracy);
         let findings = diagnosis.findings();
         if let Some(flange) = &mut uncertainty.flange {
             flange.without_size_doubt = doubt_of_size(&findings);
