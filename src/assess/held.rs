@@ -23,6 +23,8 @@ pub struct HeldTest {
     /// How far the step to the fit with all of it free moves the flange over the region of the stops, RMS, and the stated sigma, m; none where nothing
     /// ties the robot to the plate.
     pub moved_m: Option<[f64; 2]>,
+    /// That step, of the columns of robot and poses.
+    pub step: DVector<f64>,
 }
 
 /// What the data say against some held columns; `None` where it may be chance.
@@ -47,7 +49,7 @@ pub fn contradicted(fit: &Fit, held: &[usize], limits: &Limits) -> Option<HeldTe
     let framed = fit.in_frame().ok().map(|framed| framed.dense(layout.len()));
     let model = FlangeModel::of(fit, framed.as_ref().unwrap_or(&fit.covariance.reduced), limits);
     let columns = columns.into_iter().map(|(i, deviate)| (told[i], deviate)).collect();
-    Some(HeldTest { columns, deviate, moved_m: model.map(|m| m.moved_m(&step)) })
+    Some(HeldTest { columns, deviate, moved_m: model.map(|m| m.moved_m(&step)), step })
 }
 
 /// The unknowns that are let go one after the other, by their places, and the normal deviate of each.

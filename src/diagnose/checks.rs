@@ -124,12 +124,12 @@ pub const CHECKS: &[Check] = &[
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
     Check {
         explains: |own, other| match (own, other) {
+            (Finding::HeldContradicted(own), Finding::LooseMounting(loose)) => {
+                own.explains_two_places_of(&loose.mounting)
+            }
             (
                 Finding::HeldContradicted(own),
-                Finding::DoubtedSize(_)
-                | Finding::LooseMounting(_)
-                | Finding::ParameterOff(_)
-                | Finding::JointNoiseLarge(_),
+                Finding::DoubtedSize(_) | Finding::ParameterOff(_) | Finding::JointNoiseLarge(_),
             ) => own.weight == Weight::Gate,
             _ => false,
         },
