@@ -328,6 +328,27 @@ fn readings_in_another_unit_are_no_good_verdict() {
     assert!(!wrong.status.success() && said.contains("--joint-unit"), "{said}");
 }
 
+/// As `identify` names them in a tracker's points.
+#[test]
+fn left_handed_axes_and_rows_that_are_shifted_by_one_are_named() {
+    let (_, robot) = kr6();
+    let seen = points(&robot, 30, NOISE_M);
+    let mirrored = |axis: usize| {
+        let mut all = seen.clone();
+        all.iter_mut().for_each(|p| p.position_m[axis] = -p.position_m[axis]);
+        (all, Code::AxesMirrored)
+    };
+    let beside = |(a, b): (&MeasuredPoint, &MeasuredPoint)| MeasuredPoint { readings: b.readings.clone(), ..a.clone() };
+    let above = seen.iter().skip(1).zip(&seen).map(beside).collect();
+    let below = seen.iter().zip(&seen[1..]).map(beside).collect();
+    for (wrong, code) in [mirrored(0), mirrored(2), (above, Code::RowsShifted), (below, Code::RowsShifted)] {
+        let found = verdict(&wrong, "rad", None);
+        let said = String::from_utf8_lossy(&found.stderr);
+        assert_eq!(found.status.code(), Some(2), "{said}");
+        assert!(said.contains(&format!("error[{}]", code.name())), "{said}");
+    }
+}
+
 /// Points of the robot of the shipped report, within the ranges of its stops, with this error of the zero of its third joint, rad.
 fn measured_by_a_tracker(folder: &Path, zero: f64) -> PathBuf {
     measured_with(folder, zero, 2e-5)

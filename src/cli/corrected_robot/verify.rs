@@ -181,10 +181,10 @@ fn judged(
     Judged::of(robot, points, file)
 }
 
-fn contradict((model, urdf): (&Judged, &Path), file: &Path, why: &str, remedy: &str) -> Error {
+fn contradict(code: Code, (model, urdf): (&Judged, &Path), file: &Path, [why, remedy]: [&str; 2]) -> Error {
     let what =
         format!("the points are {:.1} mm RMS from where {} puts them{why}", 1e3 * model.fit.rms_m, urdf.display());
-    Error::new(Code::PointsContradict, file.display(), what, remedy)
+    Error::new(code, file.display(), what, remedy)
 }
 
 fn refuse_mistaken(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Result<()> {
@@ -195,12 +195,27 @@ fn refuse_mistaken(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) ->
     }
     let Some((mistake, left_m)) = reading_mistake(robot, points, fit.rms_m, limits) else { return Ok(()) };
     let name = |reading: usize| &robot.chain.readings[reading];
-    let undone = match mistake {
-        ReadingMistake::Reversed(joint) => format!("with the other sign of {}", name(joint)),
-        ReadingMistake::Exchanged(a, b) => format!("with {} and {} exchanged", name(a), name(b)),
+    let columns = "correct the columns of the joints";
+    let (code, undone, remedy) = match mistake {
+        ReadingMistake::Reversed(joint) => {
+            (Code::PointsContradict, format!("with the other sign of {}", name(joint)), columns)
+        }
+        ReadingMistake::Exchanged(a, b) => {
+            (Code::PointsContradict, format!("with {} and {} exchanged", name(a), name(b)), columns)
+        }
+        ReadingMistake::Mirrored => (
+            Code::AxesMirrored,
+            "with one axis of theirs reversed: the axes of the device are left-handed".into(),
+            "export in right-handed axes, or change the sign of one of x_m, y_m, z_m",
+        ),
+        ReadingMistake::Shifted(by_one_above) => {
+            let row = if by_one_above { "below" } else { "above" };
+            let undone = format!("with the joint readings of the row {row}: the rows are shifted by one");
+            (Code::RowsShifted, undone, "bring points and joint readings of the same stops into the same rows")
+        }
     };
     let why = format!(", and {:.3} mm {undone}", 1e3 * left_m);
-    Err(contradict((model, urdf), file, &why, "correct the columns of the joints"))
+    Err(contradict(code, (model, urdf), file, [&why, remedy]))
 }
 
 fn refuse_far(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Result<()> {
@@ -220,7 +235,7 @@ fn refuse_far(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Resu
             others.join(", ")
         );
     }
-    Err(contradict((model, urdf), file, why, &remedy))
+    Err(contradict(Code::PointsContradict, (model, urdf), file, [why, &remedy]))
 }
 
 fn line(what: &str, urdf: &Path, Judged { fit, .. }: &Judged) -> String {
