@@ -21,6 +21,7 @@ mod boards_real;
 mod circles;
 mod command;
 mod corners_rendered;
+mod drawn_dots;
 mod grids;
 mod image_stage;
 mod puzzleboards;

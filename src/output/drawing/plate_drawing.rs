@@ -2,6 +2,9 @@
 //!
 //! The drawing is first a list of `Figure`s in metres (origin at the sheet's centre, x right, y up), then written by one file
 //! per format. Everything but markers stays outside the quiet field, a pitch away from the outermost markers.
+//!
+//! Detectors that take each compact dark spot for a dot, as OpenCV's of blobs, must find none beside the markers: text stands on a line that
+//! joins its letters, arrows are open, and nothing short stands alone.
 
 use crate::plan::plate_design::{Sheet, quiet_field_m};
 use crate::series::{Ink, Plate, Region, regions};
@@ -36,6 +39,13 @@ pub(super) enum Figure {
 
 const LINE: f64 = 0.0002;
 const TEXT: f64 = 0.0028;
+/// Width of a line that joins letters: more than that of their strokes, so that it is seen wherever they are.
+const RULE: f64 = 0.0006;
+/// Half of the advance of a letter in the widest font, a dot font of 7 rows.
+const HALF_LETTER: f64 = 3.0 / 7.0 * TEXT;
+/// Of the bar below the quiet field, and of the lines of text.
+const BAR_BELOW: f64 = 0.0045;
+const TEXT_BELOW: f64 = 0.0105;
 
 /// All figures of a plate on its sheet.
 pub(super) fn figures(plate: &Plate, caption: &Caption) -> Vec<Figure> {
@@ -45,17 +55,18 @@ pub(super) fn figures(plate: &Plate, caption: &Caption) -> Vec<Figure> {
     axes(quiet, half, &mut all);
     let bottom = -quiet[1];
     let lattice = format!("{} x {}, pitch {:.1} mm", plate.columns, plate.rows, plate.pitch_m * 1e3);
-    let line = |k: f64| [0.0, bottom - 0.0105 - k * 1.5 * TEXT];
-    scale_bar(bottom - 0.0045, half[0], &mut all);
-    text(line(0.0), &format!("{}. {lattice}.", caption.name), &mut all);
-    text(line(1.0), &advice(&caption.sheet), &mut all);
+    let line = |k: f64| [0.0, bottom - TEXT_BELOW - k * 1.5 * TEXT];
+    let tens = bar_tens(half[0]);
+    scale_bar(bottom - BAR_BELOW, tens, &mut all);
+    ruled_text(line(0.0), half[0], &format!("{}. {lattice}.", caption.name), &mut all);
+    ruled_text(line(1.0), half[0], &advice(&caption.sheet, tens), &mut all);
     all
 }
 
-fn advice(sheet: &Sheet) -> String {
+fn advice(sheet: &Sheet, tens: u32) -> String {
     let size = format!("{:.0} x {:.0} mm", sheet.width_m * 1e3, sheet.height_m * 1e3);
     let paper = sheet.paper.map_or(size.clone(), |p| format!("{p} ({size})"));
-    format!("Print at 100 % on {paper}. Measure the bar.")
+    format!("Print on {paper}: the bar must be {} mm.", tens * 10)
 }
 
 /// The printed field itself.
@@ -93,22 +104,28 @@ fn squares(plate: &Plate) -> Vec<Figure> {
 /// Marks on all four sides that point at the origin, arrows where the axes leave the field.
 fn axes(quiet: [f64; 2], half: [f64; 2], all: &mut Vec<Figure>) {
     let along = (half[0] - quiet[0] - 0.006).clamp(0.004, 0.008);
-    let up = 0.0045;
-    let line = |from, to| Figure::Line { from, to, width: LINE };
-    all.push(line([-quiet[0] - along, 0.0], [-quiet[0], 0.0]));
-    all.push(line([quiet[0], 0.0], [quiet[0] + along, 0.0]));
-    all.push(line([0.0, -quiet[1] - 0.0015], [0.0, -quiet[1]]));
-    all.push(line([0.0, quiet[1]], [0.0, quiet[1] + up]));
+    let up = 0.010;
     let (x, y) = (quiet[0] + along, quiet[1] + up);
-    all.push(Figure::Polygon(vec![[x, 0.0], [x - 0.003, 0.001], [x - 0.003, -0.001]]));
-    all.push(Figure::Polygon(vec![[0.0, y], [0.001, y - 0.003], [-0.001, y - 0.003]]));
-    text([quiet[0] + along / 2.0, 0.002], "x", all);
-    text([0.003, quiet[1] + 0.001], "y", all);
+    let mut line = |from, to| all.push(Figure::Line { from, to, width: LINE });
+    line([-x, 0.0], [-quiet[0], 0.0]);
+    line([quiet[0], 0.0], [x, 0.0]);
+    line([0.0, -quiet[1] - BAR_BELOW], [0.0, -quiet[1]]);
+    line([0.0, quiet[1]], [0.0, y]);
+    for side in [-0.001, 0.001] {
+        line([x - 0.003, side], [x, 0.0]);
+        line([side, y - 0.003], [0.0, y]);
+    }
+    text([x + 0.0015, 0.0], "x", all);
+    text([0.0, y + 0.0005], "y", all);
 }
 
-/// A bar of 100 mm (50 mm on a small sheet) with a tick every 10 mm.
-fn scale_bar(y: f64, half_width: f64, all: &mut Vec<Figure>) {
-    let tens: u32 = if half_width > 0.075 { 10 } else { 5 };
+/// Length of the bar, 10 mm.
+fn bar_tens(half_width: f64) -> u32 {
+    if half_width > 0.075 { 10 } else { 5 }
+}
+
+/// A bar with a tick every 10 mm.
+fn scale_bar(y: f64, tens: u32, all: &mut Vec<Figure>) {
     let half = f64::from(tens) * 0.005;
     all.push(Figure::Line { from: [-half, y], to: [half, y], width: LINE });
     for k in 0..=tens {
@@ -116,7 +133,13 @@ fn scale_bar(y: f64, half_width: f64, all: &mut Vec<Figure>) {
         let tick = if k == 0 || k == tens { 0.0025 } else { 0.0012 };
         all.push(Figure::Line { from: [x, y - tick], to: [x, y + tick], width: LINE });
     }
-    text([half + 0.008, y - TEXT / 3.0], &format!("{} mm", tens * 10), all);
+}
+
+/// A line of text on a line that joins its letters, as far as the sheet reaches.
+fn ruled_text(at: [f64; 2], half_width: f64, line: &str, all: &mut Vec<Figure>) {
+    let half = (HALF_LETTER * line.len() as f64).min(half_width - 0.004);
+    all.push(Figure::Line { from: [at[0] - half, at[1]], to: [at[0] + half, at[1]], width: RULE });
+    text(at, line, all);
 }
 
 fn text(at: [f64; 2], text: &str, all: &mut Vec<Figure>) {

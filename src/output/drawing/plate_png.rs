@@ -1,5 +1,6 @@
 //! The plate as PNG, for looking at it, with its size; for printing take the PDF.
 
+use std::collections::BTreeSet;
 use std::io::Cursor;
 
 use image::{GrayImage, ImageFormat};
@@ -76,10 +77,7 @@ impl Canvas {
             }
             Figure::Line { from, to, width } => {
                 // At least a pixel wide, so that it is seen at low resolution.
-                let half = width.max(1.0 / self.scale) / 2.0;
-                let low = [from[0].min(to[0]) - half, from[1].min(to[1]) - half];
-                let high = [from[0].max(to[0]) + half, from[1].max(to[1]) + half];
-                self.fill([low[0], low[1], high[0], high[1]], |p| distance_to_segment(p, *from, *to) <= half);
+                self.stroke(*from, *to, width.max(1.0 / self.scale) / 2.0);
             }
             Figure::Text { at, height, text } => self.text(*at, *height, text),
         }
@@ -105,15 +103,26 @@ impl Canvas {
         }
     }
 
-    /// Text in a dot font of 5 x 7, capitals only.
+    /// Text in a dot font of 5 x 7, capitals only; strokes join its dots.
     fn text(&mut self, at: [f64; 2], height: f64, text: &str) {
         let dot = height / 7.0;
         let left = at[0] - 3.0 * dot * text.chars().count() as f64;
-        for [column, row] in dots(text) {
-            let x = left + column as f64 * dot;
-            let y = at[1] + (6 - row) as f64 * dot;
-            self.fill([x, y, x + dot, y + dot], |p| p[0] >= x && p[0] < x + dot && p[1] >= y && p[1] < y + dot);
+        let place = |[column, row]: [usize; 2]| [left + (column as f64 + 0.5) * dot, at[1] + (6.5 - row as f64) * dot];
+        let all: BTreeSet<[usize; 2]> = dots(text).collect();
+        for [column, row] in &all {
+            let next = [[*column, *row], [column + 1, *row], [*column, row + 1], [column + 1, row + 1]];
+            let before = column.checked_sub(1).map(|before| [before, row + 1]);
+            for other in next.into_iter().chain(before).filter(|other| all.contains(other)) {
+                self.stroke(place([*column, *row]), place(other), dot / 2.0);
+            }
         }
+    }
+
+    /// A straight line with round ends.
+    fn stroke(&mut self, from: [f64; 2], to: [f64; 2], half: f64) {
+        let low = [from[0].min(to[0]) - half, from[1].min(to[1]) - half];
+        let high = [from[0].max(to[0]) + half, from[1].max(to[1]) + half];
+        self.fill([low[0], low[1], high[0], high[1]], |p| distance_to_segment(p, from, to) <= half);
     }
 }
 
