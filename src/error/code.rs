@@ -232,7 +232,7 @@ codes! {
         RecordingDamaged "recording_damaged" "a recording is damaged, cut off, or was not closed",
         RecordingManifest "recording_manifest" "nothing beside a recording describes camera and plate",
         TopicMissing "topic_missing" "no topic carries what is needed",
-        TopicAmbiguous "topic_ambiguous" "several topics carry what is needed",
+        TopicAmbiguous "topic_ambiguous" "several topics, or several cameras in one topic, carry what is needed",
         MessagesUnreadable "messages_unreadable" "messages of a topic cannot be read",
         MessagesUnstamped "messages_unstamped" "messages have no stamp",
         ClocksApart "clocks_apart" "images and joint states were not taken at the same time",

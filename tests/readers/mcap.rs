@@ -273,6 +273,44 @@ fn missing_joints_and_topics_are_listed() {
     assert_stops(&extracted, 4);
 }
 
+/// Two cameras with one clock in one topic: frame_id alone tells their images apart.
+#[test]
+fn images_of_several_cameras_in_one_topic_are_told_apart_by_their_frame() {
+    let whole = fs::read(recording("mono8").join("mono8.mcap")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("two.mcap");
+    let mut writer = mcap::Writer::new(fs::File::create(&path).unwrap()).unwrap();
+    let mut own = String::new();
+    for message in mcap::MessageStream::new(&whole).unwrap() {
+        let mut message = message.unwrap();
+        writer.write(&message).unwrap();
+        if message.channel.schema.as_ref().is_some_and(|schema| schema.name == "sensor_msgs/msg/Image") {
+            let data = message.data.to_mut();
+            // Of the header: representation, stamp, length of the frame with its end, frame.
+            let end = 16 + u32::from_le_bytes(data[12..16].try_into().unwrap()) as usize - 1;
+            own = String::from_utf8(data[16..end].to_vec()).unwrap();
+            data[end - 1] = b'2';
+            let pixels = data.len() - (SIZE.0 * SIZE.1) as usize;
+            data[pixels..].iter_mut().for_each(|v| *v = 255 - *v);
+            writer.write(&message).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    let other = format!("{}2", &own[..own.len() - 1]);
+    assert_says(&refusal(&path, &three()), Code::TopicAmbiguous, &[own.as_str(), other.as_str(), "--image-frame"]);
+    let of = |frame: &str| RecordingOptions { image_frame: Some(frame.to_owned()), ..three() };
+    assert_says(&refusal(&path, &of("none")), Code::TopicMissing, &[own.as_str(), other.as_str(), "--image-frame"]);
+    for (frame, shown) in [(&own, false), (&other, true)] {
+        let (_folder, extracted) = read(&path, &of(frame));
+        assert_eq!(extracted.stops.stops.len(), STOPS);
+        let (_alone, plain) = read(&recording("mono8"), &three());
+        for (one, whole) in pictures(&extracted).iter().zip(pictures(&plain)) {
+            let (one, whole) = (one.to_luma8(), whole.to_luma8());
+            assert!(one.pixels().zip(whole.pixels()).all(|(a, b)| a.0[0] == if shown { 255 - b.0[0] } else { b.0[0] }));
+        }
+    }
+}
+
 #[test]
 fn other_recordings_are_refused_with_the_command_that_converts_them() {
     for (name, code, named) in [

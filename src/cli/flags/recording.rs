@@ -16,6 +16,9 @@ pub struct RecordingArgs {
     /// Recordings: topic of the images, when there are several
     #[arg(long, value_name = "TOPIC")]
     image_topic: Option<String>,
+    /// Recordings: frame_id of the images, when those of several cameras are in one topic
+    #[arg(long, value_name = "FRAME")]
+    image_frame: Option<String>,
     /// Recordings: whose time counts, that of the message's stamp or that of its recording
     #[arg(long, value_enum, default_value_t = ClockName::Stamp)]
     clock: ClockName,
@@ -68,6 +71,7 @@ impl RecordingArgs {
             joints: joints.to_vec(),
             joint_topic: self.joint_topic.clone(),
             image_topic: self.image_topic.clone(),
+            image_frame: self.image_frame.clone(),
             clock: if self.clock == ClockName::Log { Clock::Log } else { Clock::Stamp },
             image_delay_s: self.image_delay,
             motion,
@@ -83,6 +87,7 @@ impl RecordingArgs {
         let parts = [
             topic("joint-topic", &self.joint_topic),
             topic("image-topic", &self.image_topic),
+            topic("image-frame", &self.image_frame),
             (self.clock == ClockName::Log).then(|| " --clock log".to_owned()),
             seconds("image-delay", self.image_delay),
             (self.picture == PickingName::Average).then(|| " --picture average".to_owned()),

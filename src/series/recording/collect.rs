@@ -117,7 +117,8 @@ impl<'a> Collector<'a> {
     }
 
     pub fn take(&mut self, message: &Message<'_>) -> Result<()> {
-        let Ok(stamp_ns) = messages::stamp_of(message.data) else { return Ok(()) };
+        let frame = self.options.image_frame.as_deref();
+        let Some(stamp_ns) = messages::stamp_in(message.data, frame) else { return Ok(()) };
         let time = time_ns(stamp_ns, message, self.options.clock);
         let Some(stop) = self.stop_of.remove(&time) else { return Ok(()) };
         if self.open[stop].done {

@@ -12,7 +12,7 @@ use super::frame::Frame;
 use super::message::Message;
 use super::messages;
 use super::motion::{Posture, Standstill, moved};
-use super::options::Clock;
+use super::options::RecordingOptions;
 use super::scan::time_ns;
 use crate::error::{Code, Notice};
 
@@ -147,9 +147,9 @@ impl Frames {
     }
 
     /// Looks at a message of the images; one that cannot be read is left out.
-    pub fn take(&mut self, message: &Message<'_>, clock: Clock) {
-        let Ok(stamp_ns) = messages::stamp_of(message.data) else { return };
-        let time = time_ns(stamp_ns, message, clock);
+    pub fn take(&mut self, message: &Message<'_>, options: &RecordingOptions) {
+        let Some(stamp_ns) = messages::stamp_in(message.data, options.image_frame.as_deref()) else { return };
+        let time = time_ns(stamp_ns, message, options.clock);
         if self.wanted.binary_search(&time).is_err() || self.reduced.contains_key(&time) {
             return;
         }

@@ -60,7 +60,7 @@ pub struct Extracted {
 pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> Result<Extracted> {
     let mut scan = scan(recording, options.clock)?;
     let JointReadings { topics, samples, joints } = scan.joint_readings(options)?;
-    let (image_topic, mut times) = scan.image_topic(options)?;
+    let (image_topic, image_frame, mut times) = scan.image_topic(options)?;
     times.sort_unstable();
     times.dedup();
     let mut postures = postures(&samples, &joints);
@@ -112,7 +112,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         reports,
         image_delay_s: lateness.image_delay_s,
         late,
-        camera_info: scan.camera_info(&image_topic).cloned(),
+        camera_info: scan.camera_info(&image_topic, image_frame.as_deref()).cloned(),
         joint_topic: topics.join(", "),
         image_topic,
         notices,

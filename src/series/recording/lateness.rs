@@ -123,7 +123,7 @@ fn told_by_motion(
     for file in &scan.files {
         for_each(file, |message| {
             if message.topic == topic {
-                frames.take(&message, options.clock);
+                frames.take(&message, options);
             }
             Ok(())
         })?;

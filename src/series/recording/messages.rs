@@ -19,9 +19,15 @@ pub(super) fn stamp(cdr: &mut Cdr<'_>) -> Decoded<i64> {
     header(cdr).map(|(stamp_ns, _)| stamp_ns)
 }
 
-/// Stamp of a message that begins with a header, ns.
-pub(super) fn stamp_of(message: &[u8]) -> Decoded<i64> {
-    stamp(&mut Cdr::new(message)?)
+/// Stamp of a message that begins with a header, ns, and its frame.
+pub(super) fn header_of(message: &[u8]) -> Decoded<(i64, &str)> {
+    header(&mut Cdr::new(message)?)
+}
+
+/// Stamp of an image, ns, where it can be read and is of this frame.
+pub(super) fn stamp_in(message: &[u8], frame: Option<&str>) -> Option<i64> {
+    let (stamp_ns, own) = header_of(message).ok()?;
+    frame.is_none_or(|frame| frame == own).then_some(stamp_ns)
 }
 
 /// `sensor_msgs/JointState` without the values of velocity and effort.

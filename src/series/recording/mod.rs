@@ -13,6 +13,7 @@ mod delay;
 mod extract;
 mod file;
 mod frame;
+mod image_frames;
 #[cfg(feature = "mcap")]
 mod interfaces;
 mod kind;

@@ -52,6 +52,8 @@ pub struct RecordingOptions {
     pub joint_topic: Option<String>,
     /// Topic of the images; needed when there are several.
     pub image_topic: Option<String>,
+    /// Frame of the images (`frame_id` of their headers); needed where the images of several cameras are in one topic.
+    pub image_frame: Option<String>,
     /// Which time counts.
     pub clock: Clock,
     /// How long before its time an image was taken, s; measured from the motion in the images where it is not given.
@@ -74,6 +76,7 @@ impl Default for RecordingOptions {
             joint_unit: None,
             joint_topic: None,
             image_topic: None,
+            image_frame: None,
             clock: Clock::Stamp,
             image_delay_s: None,
             motion: Motion::Refuse,

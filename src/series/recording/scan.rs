@@ -7,6 +7,7 @@ use std::rc::Rc;
 
 use super::cdr::Decoded;
 use super::file::for_each;
+use super::image_frames::{ByFrame, Infos};
 use super::message::Message;
 use super::messages::{self, CameraInfo, JointState};
 use super::options::{Clock, RecordingOptions};
@@ -75,8 +76,8 @@ pub(super) struct Scan {
     pub files: Vec<PathBuf>,
     topics: BTreeMap<String, Topic>,
     joints: BTreeMap<String, Vec<JointSample>>,
-    images: BTreeMap<String, Vec<i64>>,
-    infos: BTreeMap<String, CameraInfo>,
+    images: BTreeMap<String, ByFrame>,
+    infos: BTreeMap<String, Infos>,
     /// Memory of the joint samples, bytes.
     held: usize,
     pub notices: Vec<Notice>,
@@ -158,12 +159,11 @@ impl Scan {
                 samples.push(JointSample { time_ns, names, positions: state.positions, unread, marks });
             }
             messages::IMAGE | messages::COMPRESSED_IMAGE => {
-                let time_ns = self.stamped(message, messages::stamp_of(message.data)?, clock);
-                self.images.entry(message.topic.to_string()).or_default().push(time_ns);
+                let (stamp_ns, frame) = messages::header_of(message.data)?;
+                let time_ns = self.stamped(message, stamp_ns, clock);
+                self.images.entry(message.topic.to_string()).or_default().note(frame, time_ns);
             }
-            messages::CAMERA_INFO if !self.infos.contains_key(message.topic) => {
-                self.infos.insert(message.topic.to_string(), CameraInfo::read(message.data)?);
-            }
+            messages::CAMERA_INFO => self.infos.entry(message.topic.to_string()).or_default().note(message.data)?,
             _ => {}
         }
         Ok(())
@@ -201,14 +201,14 @@ impl Scan {
             return;
         }
         let of_joints = self.joints.values().flat_map(|samples| twice(samples.iter().map(|s| s.time_ns)));
-        let of_images = self.images.values().flat_map(|times| twice(times.iter().copied()));
+        let of_images = self.images.values().flat_map(ByFrame::times).flat_map(|times| twice(times.iter().copied()));
         let by_stamps = self.joints.keys().filter(|_| clock == Clock::Stamp).filter_map(|name| self.topics.get(name));
         let of_stamps = by_stamps.flat_map(|topic| set_back(&topic.delays_ns));
         let twice: Vec<Range<i64>> = of_joints.chain(of_images).chain(of_stamps).collect();
         let Some(longest) = twice.iter().map(|t| t.end - t.start).max() else { return };
         let once = |time: i64| !twice.iter().any(|t| (t.start..=t.end).contains(&time));
         self.joints.values_mut().for_each(|samples| samples.retain(|s| once(s.time_ns)));
-        self.images.values_mut().for_each(|times| times.retain(|t| once(*t)));
+        self.images.values_mut().for_each(|frames| frames.retain(|t| once(*t)));
         let what =
             format!("its times go back by {:.1} s: a clock was set while it was recorded", longest as f64 * 1e-9);
         let left_out = "what was recorded in the times that are there twice is left out";
@@ -393,8 +393,8 @@ impl Scan {
         Ok(JointReadings { topics, samples, joints })
     }
 
-    /// The topic of the images and their times, ns.
-    pub fn image_topic(&mut self, options: &RecordingOptions) -> Result<(String, Vec<i64>)> {
+    /// The topic of the images, their frame where they have one in common, and their times, ns.
+    pub fn image_topic(&mut self, options: &RecordingOptions) -> Result<(String, Option<String>, Vec<i64>)> {
         let asked = options.image_topic.as_deref();
         let mut candidates: Vec<&str> = self.with_schema(&[messages::IMAGE, messages::COMPRESSED_IMAGE]).collect();
         if asked.is_none() {
@@ -404,11 +404,13 @@ impl Scan {
             candidates.retain(|c| c.strip_suffix("/compressed").is_none_or(|base| !raw.contains(&base)));
         }
         let topic = self.choose(asked, &candidates, &IMAGES)?.to_string();
-        let times = self.images.remove(&topic).unwrap_or_default();
+        let place = format!("{}, topic {topic}", self.recording.display());
+        let frames = self.images.remove(&topic).unwrap_or_default();
+        let (frame, times) = frames.chosen(options.image_frame.as_deref(), &place)?;
         if times.is_empty() {
             return Err(self.unreadable(&topic, &IMAGES));
         }
-        Ok((topic, times))
+        Ok((topic, frame, times))
     }
 
     /// A topic without one message of use.
@@ -428,15 +430,15 @@ impl Scan {
         Error::new(Code::MessagesUnreadable, place, format!("none of its {} can be used{reason}", wanted.what), remedy)
     }
 
-    /// The camera info beside an image topic, or the only one.
-    pub fn camera_info(&self, image_topic: &str) -> Option<&CameraInfo> {
+    /// The camera info beside an image topic, or the only one: that of the frame of the images where it is of several.
+    pub fn camera_info(&self, image_topic: &str, frame: Option<&str>) -> Option<&CameraInfo> {
         let base = image_topic.strip_suffix("/compressed").unwrap_or(image_topic);
         let beside = base.rsplit_once('/').map(|(namespace, _)| format!("{namespace}/camera_info"));
-        match beside.and_then(|topic| self.infos.get(&topic)) {
-            Some(info) => Some(info),
+        let infos = match beside.and_then(|topic| self.infos.get(&topic)) {
             None if self.infos.len() == 1 => self.infos.values().next(),
-            None => None,
-        }
+            infos => infos,
+        };
+        infos?.of(frame)
     }
 
     /// Median time from stamp to recording over some topics, s.
