@@ -307,6 +307,26 @@ fn study_of_over_exposed_tags() {
     }
 }
 
+/// Tags whose sides lie along the rows and columns of pixels on such paper: where their picture was clipped is not seen in a smoothed copy.
+#[test]
+fn over_exposed_tags_along_the_rows_are_as_uncertain_as_stated() {
+    for board in &BOARDS[2..] {
+        let mut tallies = [Tally::default(), Tally::default()];
+        for seed in 0..6 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut view = view(board.1, &mut rng);
+            (view.tilt_deg, view.roll_deg, view.distortion) = (rng.random_range(0.0..2.0), 0.3, [0.0; 5]);
+            view.conditions.psf_sigma_px = 0.2;
+            let scene = scene_of(*board, &view);
+            let asked = |id: u32| usize::from(scene.corner(id).is_some_and(|p| scene.within(&p) > 8.0));
+            look(&scene, &Light::even(1.8, 1.0), seed, &mut tallies, [&asked, &|_| 0]);
+        }
+        let [all, _] = tallies;
+        println!("{:10} {}", board.0, all.said());
+        assert!(all.share() > 0.5 && all.far == 0 && all.normalised() < 2.0, "{}", all.said());
+    }
+}
+
 /// Single tags of so many px with a blur, in encoded light.
 fn small_in_encoded_light(board: (&str, f64, &str), seeds: std::ops::Range<u64>, side_px: f64, blur_px: f64) -> Tally {
     let mut tallies = [Tally::default(), Tally::default()];

@@ -22,7 +22,7 @@
 
 use nalgebra::{Matrix2, SMatrix, Vector2};
 
-use super::edge_shape::PixelShape;
+use super::edge_shape::{PixelShape, SHARPEST_SQUARE};
 use super::edge_sums::{
     BLUR, Column, DARK, FAR_BLURS, FEW_PARAMETERS, Normal, Pixel, SHAPE, STEP, Shape, Sums, powers, sums,
 };
@@ -235,6 +235,11 @@ impl EdgeLine {
         self.fit.blur_px
     }
 
+    /// The same before a smoothing with this sigma, px.
+    pub fn blur_before(&self, smoothing_px: f64) -> f64 {
+        (self.fit.blur_px.powi(2) - smoothing_px * smoothing_px).max(SHARPEST_SQUARE).sqrt()
+    }
+
     /// The pixels of the band: without the ends, and as far to both sides as nothing disturbs: what blur asks for, px, and what is to spare.
     fn band(
         &self,
@@ -320,6 +325,28 @@ impl EdgeLine {
         self.shape[0] -= by_px;
         self.fit.common = variance;
         self
+    }
+
+    /// The side with a variance of its place more, px^2.
+    pub fn displaced(mut self, variance: f64) -> Self {
+        self.fit.covariance[(0, 0)] += variance;
+        self
+    }
+
+    /// Places beside a side of this length, a pixel apart along it and so many px to its light.
+    pub fn beside(&self, length: f64, to_light: impl Iterator<Item = f64> + Clone) -> impl Iterator<Item = [f64; 2]> {
+        let half = (0.5 * length).floor() as i64;
+        let (side, lines) = (*self, to_light);
+        (-half..=half).flat_map(move |x| {
+            lines
+                .clone()
+                .map(move |y| (side.middle + side.along * x as f64 + side.across * (side.offset(x as f64) + y)).into())
+        })
+    }
+
+    /// How many rows or columns of pixels a side of this length crosses, whichever is fewer.
+    pub fn crossed(&self, length: f64) -> f64 {
+        length * self.along.abs().min()
     }
 
     /// Where two sides cross near `start`, with the covariance (uu, uv, vv), px^2.

@@ -17,7 +17,7 @@ use nalgebra::Vector2;
 /// The fourth cumulant of the width of a pixel, px^4, over -24.
 const OF_PIXEL: f64 = 1.0 / 2880.0;
 /// Sigma of the width of a pixel, squared: no edge is sharper.
-const SHARPEST_SQUARE: f64 = 1.0 / 12.0;
+pub(super) const SHARPEST_SQUARE: f64 = 1.0 / 12.0;
 /// Part of the term of a pixel that is not known: cumulants beyond the fourth, and pixels that do not see all of their area.
 const UNKNOWN: f64 = 0.3;
 /// Sigma of `k` of a lens: a disc of defocus with half of the variance of a Gaussian, or a quarter of the whole, has 0.003.

@@ -9,10 +9,12 @@
 //! ```text
 //! quads (quadrilaterals) -> code, scan (what is written in them) -> layout (do the neighbours agree)
 //!         -> edge_line, edge_sums, edge_shape, beside, misfit (sides, and what disturbs them) -> code_edges, growth (how far ink reaches beyond its place)
+//!         -> clipped (what a smoothed copy hides)
 //!         -> pipeline (the stages in their order) -> seen (what stands there instead)
 //! ```
 
 mod beside;
+mod clipped;
 pub(super) mod code;
 mod code_edges;
 mod edge_line;

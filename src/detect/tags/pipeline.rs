@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::beside::Printed;
+use super::clipped;
 use super::code::{Reader, SURE_BITS};
 use super::edge_line::{ENDS_SPARE_PX, EdgeLine, Measured, Side};
 use super::growth::{self, Growth, InPicture, Outlined};
@@ -56,11 +57,11 @@ type Sides = BTreeMap<usize, [Measured; 4]>;
 /// A dictionary that is not known; no tag of the plate in the picture; every tag in it twice; a mirrored picture.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let tags = plate.tags.as_ref().ok_or_else(no_tags)?;
-    let board = Board::of(picture, plate, tags, 0.0)?;
+    let board = Board::of(picture, None, plate, tags)?;
     let mut best = board.look()?;
     if !best.as_ref().is_some_and(|found| board.is_enough(found)) {
         let smooth = smoothed(picture, SMOOTHING_PX);
-        let better = match Board::of(&smooth, plate, tags, SMOOTHING_PX)?.look() {
+        let better = match Board::of(&smooth, Some(picture), plate, tags)?.look() {
             Err(error) if best.is_none() => return Err(error),
             other => other.ok().flatten(),
         };
@@ -83,17 +84,20 @@ struct Board<'a> {
     reader: Reader,
     /// Places of the tags by their numbers.
     places: BTreeMap<u32, usize>,
+    /// The picture before it was smoothed.
+    raw: Option<&'a Picture>,
     /// Sigma with which the picture was smoothed, px.
     smoothing_px: f64,
 }
 
 impl<'a> Board<'a> {
-    fn of(picture: &'a Picture, plate: &'a Plate, tags: &'a Tags, smoothing_px: f64) -> Result<Self> {
+    fn of(picture: &'a Picture, raw: Option<&'a Picture>, plate: &'a Plate, tags: &'a Tags) -> Result<Self> {
         let count = plate.columns * plate.rows;
         let reader = Reader::of(tags, &tags.dictionary("plate", count)?);
         let number = |place: u32| tags.tag_at(place, plate.columns, plate.rows).0;
         let places = (0..count).map(|place| (number(place), place as usize)).collect();
-        Ok(Self { picture, plate, tags, reader, places, smoothing_px })
+        let smoothing_px = if raw.is_some() { SMOOTHING_PX } else { 0.0 };
+        Ok(Self { picture, plate, tags, reader, places, raw, smoothing_px })
     }
 
     /// What is found in the picture, measured or not; `None` where there is none of the tags.
@@ -237,7 +241,7 @@ impl<'a> Board<'a> {
         for (place, four) in &sides {
             let id = self.number(*place);
             let growth = of_place(place);
-            let four = four.map(|side| Ok(side?.shrunk(growth.px, growth.variance)));
+            let four = self.corrected(four, &found[place], growth);
             for ((k, corner), start) in (0..).zip(crossings(&four, &found[place])).zip(found[place]) {
                 match corner {
                     Ok((uv, covariance)) => {
@@ -251,6 +255,16 @@ impl<'a> Board<'a> {
         detection.observations.sort_by_key(|o| o.marker);
         // An encoding displaces an edge by less than its blur.
         if known.is_some() { 0.0 } else { blur_px }
+    }
+
+    /// The sides of a tag with these corners where its ink ends, and not where it seems to.
+    fn corrected(&self, four: &[Measured; 4], corners: &Quad, growth: Growth) -> [Measured; 4] {
+        [0, 1, 2, 3].map(|k: usize| {
+            let side = four[k]?;
+            let length = distance(corners[k], corners[(k + 1) % 4]);
+            let unseen = |raw| clipped::variance(raw, self.smoothing_px, &side, length, growth);
+            Ok(side.shrunk(growth.px, growth.variance).displaced(self.raw.map_or(0.0, unseen)))
+        })
     }
 
     /// Whether each outer line of tags shows one, or should be in view.
