@@ -271,7 +271,7 @@ impl<'a> FlangeModel<'a> {
     /// Sigma of the position where a joint is outside the range of the stops, within all joint limits: median of the lengths, m; none where nothing is.
     pub(super) fn outside_m(&self) -> Option<f64> {
         let found = everywhere(&self.robot).into_iter().map(|s| self.at(&s.readings));
-        median(&found.filter(|f| !f.outside.is_empty()).map(|f| f.sigmas()[0]).collect::<Vec<_>>())
+        median(found.filter(|f| !f.outside.is_empty()).map(|f| f.sigmas()[0]))
     }
 
     /// Samples of the region of the stops, then of everything within the joint limits.
