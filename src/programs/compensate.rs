@@ -6,7 +6,7 @@
 //!
 //! With measured tools `T` and work objects `W` of both robots, `W_B^-1 B(q') T_B = W_A^-1 A(q) T_A`: the tool comes to the same place of the work object.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use nalgebra::Vector6;
 
@@ -19,6 +19,7 @@ use super::program::{
     Approach, DisplacedTarget, Left, PoseTarget, Program, Target, TargetKind, Understood, write_joints,
 };
 use super::reason::{DeclaredPoint, LeftReason, Why};
+use super::shared_points::{Fate, Written, fates};
 use crate::geom::Pose;
 use crate::model::inverse::{self, Reach, Stalled};
 use crate::model::robot::Robot;
@@ -119,24 +120,33 @@ pub struct Compensated {
 impl Compensated {
     /// Says of computed targets with which corrected points they move.
     pub fn tell_what_moves(&self, program: &mut Program) {
-        let corrected = |point: &&DeclaredPoint| {
-            let all = program.targets.iter().zip(&self.outcomes);
-            all.into_iter().any(|(t, outcome)| {
-                (t.file, t.line) == (point.file, point.line) && matches!(outcome, TargetOutcome::Done(_))
-            })
-        };
+        let done = || program.targets.iter().zip(&self.outcomes).filter(|(_, o)| matches!(o, TargetOutcome::Done(_)));
+        let corrected = |point: &&DeclaredPoint| done().any(|(t, _)| (t.file, t.line) == (point.file, point.line));
         for Left { why, .. } in &mut program.left {
-            let names: Vec<&str> = why.starts_from.iter().filter(corrected).map(|point| &point.name[..]).collect();
+            // One that is used with a known tool and work object as well.
+            let itself = why.about.iter().filter(|name| done().any(|(t, _)| t.visited && t.name == **name));
+            let points = why.starts_from.iter().filter(corrected).map(|point| &point.name);
+            let names: BTreeSet<&str> = itself.chain(points).map(String::as_str).collect();
             if !names.is_empty() {
+                let names: Vec<&str> = names.into_iter().collect();
                 why.words += &format!("; it moves with {}, corrected for itself", names.join(" and "));
             }
         }
     }
 
+    /// True for a use of a point that stays as it is, which was said of an earlier use of it with another tool or work object.
+    pub fn is_said(&self, program: &Program, k: usize) -> bool {
+        let place = |k: usize| (program.targets[k].file, program.targets[k].line, &program.targets[k].name);
+        let is_shared = |o: &TargetOutcome| matches!(o, TargetOutcome::Left(w) if w.reason == LeftReason::FramesDiffer);
+        let outcome = &self.outcomes[k];
+        is_shared(outcome) && (0..k).any(|earlier| place(earlier) == place(k) && self.outcomes[earlier] == *outcome)
+    }
+
     /// All targets that stay as they are, those included that could not be read.
     pub fn left(&self, program: &Program) -> Vec<Left> {
-        let visited = program.targets.iter().zip(&self.outcomes).filter(|(t, _)| t.visited);
-        let unreached = visited.filter_map(|(t, o)| match o {
+        let all = program.targets.iter().zip(&self.outcomes).enumerate();
+        let visited = all.filter(|(k, (t, _))| t.visited && !self.is_said(program, *k));
+        let unreached = visited.filter_map(|(_, (t, o))| match o {
             TargetOutcome::Done(_) => None,
             TargetOutcome::Left(why) => {
                 Some(Left { file: t.file, line: t.line, name: t.name.clone(), why: why.clone() })
@@ -151,7 +161,7 @@ impl Compensated {
 /// Corrects every target of a program, in the order of visiting.
 pub fn compensate(program: &Program, models: Models<'_>, postures: &Postures) -> Compensated {
     let mut work = Work::new(models, program);
-    let mut edits = program.edits.clone();
+    let mut own_edits = Vec::with_capacity(program.targets.len());
     let mut outcomes = Vec::with_capacity(program.targets.len());
     let mut displaced = Vec::new();
     let finder = Finder::new(models.controller, &work.limits, postures.start.as_deref());
@@ -159,16 +169,27 @@ pub fn compensate(program: &Program, models: Models<'_>, postures: &Postures) ->
     for ((k, target), meant) in program.targets.iter().enumerate().zip(all_meant) {
         match work.target(target, meant, program) {
             Ok((correction, own, later)) => {
-                edits.extend(own);
+                own_edits.push(own);
                 displaced.extend(later.map(|l| (k, l)));
                 outcomes.push(TargetOutcome::Done(correction));
             }
             Err(why) => {
-                edits.extend(empty_cells(target));
+                own_edits.push(empty_cells(target));
                 outcomes.push(TargetOutcome::Left(why));
             }
         }
     }
+    for (k, fate) in fates(&program.targets, &work.written, RESIDUAL).into_iter().enumerate() {
+        match fate {
+            Fate::Own => continue,
+            Fate::Said => {}
+            Fate::Left(why) if work.written[k].take().is_some() => outcomes[k] = TargetOutcome::Left(why),
+            Fate::Left(_) => {}
+        }
+        own_edits[k].clear();
+    }
+    let mut edits = program.edits.clone();
+    edits.extend(own_edits.into_iter().flatten());
     // Displaced points are written when the points that they start from are.
     for (k, later) in displaced {
         if let TargetOutcome::Done(correction) = &mut outcomes[k] {
@@ -222,8 +243,8 @@ struct Work<'a> {
     limits: Vec<(f64, f64)>,
     /// One for each target so far.
     places: Vec<Reached>,
-    /// Corrected points that others may start from: file and first byte -> pose in the work object.
-    written: BTreeMap<(usize, usize), Pose>,
+    /// How the pose of each target is written, where it is: displaced ones are written last.
+    written: Vec<Option<Written>>,
 }
 
 /// What became of a target: its correction, its edits, and what is written later.
@@ -234,11 +255,12 @@ impl<'a> Work<'a> {
         let limits = inverse::stated_limits(&models.to.chain);
         let limits: Vec<_> = limits.into_iter().map(|l| l.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))).collect();
         let frames = models.frames.map(|measured| FramesOfProgram::new(measured, &program.targets));
-        Self { models, frames, limits, places: Vec::new(), written: BTreeMap::new() }
+        Self { models, frames, limits, places: Vec::new(), written: Vec::new() }
     }
 
     fn target(&mut self, target: &Target, meant: Understood<Meant>, program: &Program) -> Understood<Worked> {
         self.places.push(None);
+        self.written.push(None);
         self.worked(target, meant?, program)
     }
 
@@ -266,6 +288,7 @@ impl<'a> Work<'a> {
         let pose_at = |q: &[f64]| self.models.to.pose_at(&to.stop(q), &vec![0.0; q.len()]);
         let at_tool = |flange: Pose| flange * moved.flange_from_tool;
         let (turn_rad, shift_m) = at_tool(pose_at(&programmed)).distance(&at_tool(wanted));
+        let mut written = None;
         let (edits, read, later) = match kind {
             TargetKind::Joints(joints) => {
                 let (edits, read) = joints.edits(&corrected, &program.files);
@@ -277,8 +300,12 @@ impl<'a> Work<'a> {
             }
             TargetKind::Pose(pose) => match &pose.displaced {
                 None => {
-                    let (edits, read) = self.pose_edits(pose, &held, &programmed, &corrected, program)?;
-                    (edits, read, None)
+                    let (edits, base_from_flange) =
+                        pose.edits(&self.models.controller.base_from_tip(&corrected), &program.files);
+                    let codes = self.code_edits(pose, &programmed, &corrected, program);
+                    let read = self.commanded(&base_from_flange, &held, &corrected)?;
+                    written = Some(Written::new(pose, &base_from_flange, codes.clone()));
+                    ([edits, codes].concat(), read, None)
                 }
                 Some(displaced) => {
                     let (pose, displaced) = (PoseTarget::clone(pose), displaced.clone());
@@ -294,33 +321,13 @@ impl<'a> Work<'a> {
             let rest = in_words(residual_m, residual_rad);
             return Err(Why::new(LeftReason::Coarse, format!("the decimals of the text leave {rest}")));
         }
-        if let TargetKind::Pose(pose) = kind
-            && later.is_none()
-        {
-            let place = (target.file, kind.first_byte());
-            let base_from_flange = self.models.controller.base_from_tip(&read);
-            let work_from_tool = pose.base_from_work.inverse() * base_from_flange * pose.flange_from_tool;
-            self.written.insert(place, work_from_tool);
+        if let Some(last) = self.written.last_mut() {
+            *last = written;
         }
         let posture = known;
         let correction =
             Correction { programmed, corrected: read, posture, shift_m, turn_rad, residual_m, residual_rad };
         Ok((correction, edits, later))
-    }
-
-    /// Edits that write the pose of the controller's model, and the joints that this model finds in it.
-    fn pose_edits(
-        &self,
-        pose: &PoseTarget,
-        held: &[bool],
-        programmed: &[f64],
-        corrected: &[f64],
-        program: &Program,
-    ) -> Understood<(Vec<Edit>, Vec<f64>)> {
-        let (mut edits, base_from_flange) =
-            pose.edits(&self.models.controller.base_from_tip(corrected), &program.files);
-        edits.extend(self.code_edits(pose, programmed, corrected, program));
-        Ok((edits, self.commanded(&base_from_flange, held, corrected)?))
     }
 
     fn commanded(&self, base_from_flange: &Pose, held: &[bool], near: &[f64]) -> Understood<Vec<f64>> {
@@ -332,7 +339,10 @@ impl<'a> Work<'a> {
     /// point that it starts from.
     fn displaced(&self, later: &Later, correction: &mut Correction, program: &Program) -> Understood<Vec<Edit>> {
         let Later { pose, displaced, held, previous, wanted } = later;
-        let base = self.written.get(&displaced.base).copied().unwrap_or_else(|| pose.work_from_base());
+        let is_base = |target: &Target| (target.file, target.kind.first_byte()) == displaced.base;
+        let mut written = program.targets.iter().zip(&self.written).filter(|(target, _)| is_base(target));
+        let base = written.find_map(|(_, written)| Some(written.as_ref()?.work_from_tool));
+        let base = base.unwrap_or_else(|| pose.work_from_base());
         let to = reach(self.models.to, &self.limits, held, previous.as_deref());
         let (work, tool) = (&pose.base_from_work, &pose.flange_from_tool);
         let wanted_tool = *wanted * *tool;

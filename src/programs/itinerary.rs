@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::flow::{Flow, Followed};
 use super::program::{Approach, Arrival, Left, MeantPosture, Program, Target, TargetKind};
 
-/// File of a target, and its first byte there.
-type Place = (usize, usize);
+/// A target: its file, its first byte there, and which of the uses with different tools or work objects it is.
+type Place = (usize, usize, usize);
 
 /// From where a stand is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -109,8 +109,8 @@ impl Followed for Stands {
 pub(super) struct Itinerary {
     /// What was found so far.
     pub program: Program,
-    /// File and first byte of a target -> its index in the program.
-    visited: BTreeMap<Place, usize>,
+    /// File and first byte of a target -> its indices in the program, one for each tool and work object that it is used with.
+    visited: BTreeMap<(usize, usize), Vec<usize>>,
     /// Ways to each target, with the posture that the motion means.
     arrivals: BTreeMap<usize, Vec<(Stand, MeantPosture)>>,
     /// From where the robot comes to the next target.
@@ -189,31 +189,28 @@ impl Itinerary {
 
     /// A target that no motion goes to.
     pub fn declare(&mut self, target: Target) {
-        self.visited.insert((target.file, target.kind.first_byte()), self.program.targets.len());
+        let uses = self.visited.entry((target.file, target.kind.first_byte())).or_default();
+        uses.push(self.program.targets.len());
         self.program.targets.push(target);
     }
 
-    /// Visits a target, perhaps again. False where it was visited before with another tool or work object.
-    #[must_use]
-    pub fn visit(&mut self, mut target: Target, now: &mut Stands) -> bool {
-        let place = (target.file, target.kind.first_byte());
-        let index = match self.visited.get(&place) {
-            Some(&known) if !has_frames_of(&self.program.targets[known].kind, &target.kind) => return false,
-            Some(&known) => {
-                self.keep_codes(known, &target.kind);
-                self.keep_frames(known, &target.kind);
-                known
-            }
-            None => self.program.targets.len(),
-        };
+    /// Visits a target, perhaps again; with another tool or work object it is another one that has the same text.
+    pub fn visit(&mut self, mut target: Target, now: &mut Stands) {
+        let (file, first) = (target.file, target.kind.first_byte());
+        let uses = self.visited.get(&(file, first)).map(Vec::as_slice).unwrap_or_default();
+        let known = uses.iter().position(|&k| self.program.targets[k].kind.has_frames_of(&target.kind));
+        let place = (file, first, known.unwrap_or(uses.len()));
+        let index = known.map_or(self.program.targets.len(), |known| uses[known]);
         self.arrive(index, &target.kind, now);
-        if index == self.program.targets.len() {
+        if known.is_some() {
+            self.keep_codes(index, &target.kind);
+            self.keep_frames(index, &target.kind);
+        } else {
             target.approach = self.from;
             self.declare(target);
         }
         self.from = Approach::From(index);
         *now = Stands::at(Origin::Target(place));
-        true
     }
 
     /// Codes stand in the text and are corrected, whether the motion that comes first heeds them or not.
@@ -265,7 +262,7 @@ impl Itinerary {
 
     /// The program with all ways to its targets.
     pub fn finished(mut self) -> Program {
-        let index = |place| self.visited.get(&place).copied();
+        let index = |(file, first, which): Place| self.visited.get(&(file, first))?.get(which).copied();
         let approach = |stand: Stand, leaves_out: bool| {
             let from = match stand.from {
                 Origin::Target(place) => index(place).map_or(Approach::Unknown, Approach::From),
@@ -286,15 +283,5 @@ impl Itinerary {
             target.arrivals = ways.into_iter().map(arrival).collect();
         }
         self.program
-    }
-}
-
-/// True where two poses have the same tool and work object.
-fn has_frames_of(one: &TargetKind, other: &TargetKind) -> bool {
-    match (one, other) {
-        (TargetKind::Pose(a), TargetKind::Pose(b)) => {
-            (a.flange_from_tool, a.base_from_work) == (b.flange_from_tool, b.base_from_work)
-        }
-        _ => true,
     }
 }

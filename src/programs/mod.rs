@@ -9,6 +9,7 @@
 //! | `meant` | the same from wherever the robot comes |
 //! | [`measured_frames`], `frame_candidates` | tool and work object of the real robot instead of those of the program, and which of these they are |
 //! | [`mod@compensate`] | targets of one robot to targets of another |
+//! | `shared_points` | points that are used with several tools or work objects |
 //! | `flow` | what statements set, followed through branches, loops and calls |
 //! | `held` | one thing that statements set |
 //! | `references` | what routines change that is given them by reference |
@@ -44,6 +45,7 @@ mod references;
 mod routines;
 mod scan;
 mod setting;
+mod shared_points;
 mod table;
 mod text_file;
 mod urscript;

@@ -140,6 +140,16 @@ impl TargetKind {
         }
     }
 
+    /// True where two poses have the same tool and work object.
+    pub(super) fn has_frames_of(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Pose(a), Self::Pose(b)) => {
+                (a.flange_from_tool, a.base_from_work) == (b.flange_from_tool, b.base_from_work)
+            }
+            _ => true,
+        }
+    }
+
     /// True where the text leaves numbers out that the target has.
     pub(super) fn is_partial(&self) -> bool {
         match self {

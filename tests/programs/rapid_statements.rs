@@ -76,12 +76,30 @@ fn moves_behind_conditions_of_one_line_and_over_several_lines_are_corrected() {
 #[test]
 fn tools_and_work_objects_of_moves_behind_conditions_are_held_against_each_other() {
     let cell = Cell::kuka(92);
-    for second in ["tool0\\WObj:=wTable", "tGun\\WObj:=wobj0", "tGun"] {
-        let body = format!("MoveJ p1,v1,z1,tGun\\WObj:=wTable;\nIF di1=1 MoveJ p1,v1,z1,{second};");
-        let told = run(&cell, &body, &[]).1.expect(1).told();
-        assert_eq!(told.left.len(), 1, "{told:?}");
-        assert_eq!(told.left[0].2, LeftReason::FramesDiffer.name());
+    let second = ["tool0\\WObj:=wTable", "tGun\\WObj:=wobj0", "tGun"].map(|s| format!("IF di1=1 MoveJ p1,v1,z1,{s};"));
+    let moved = second.map(|second| format!("MoveJ p1,v1,z1,tGun\\WObj:=wTable;\n{second}"));
+    // Nor do two uses count that are no known moves.
+    let used = "CapL p1,v1,cap,tGun\\WObj:=wTable;\nCapL p1,v1,cap,tGun\\WObj:=wobj0;".to_owned();
+    let reason = LeftReason::FramesDiffer.name();
+    for body in moved.into_iter().chain([used]) {
+        let (text, run) = run(&cell, &body, &[]);
+        let told = run.expect(1);
+        assert_eq!(told.text("m.mod"), text, "what both ask for differs, and so neither gets it");
+        let told = told.told();
+        assert_eq!((told.corrected, told.left.first().map(|(.., r)| r.as_str())), (0, Some(reason)), "{told:?}");
     }
+}
+
+#[test]
+fn a_point_whose_two_work_objects_ask_for_the_same_correction_gets_it() {
+    let cell = Cell::kuka(98);
+    let near = WORK.replace("wTable", "wNear").replace("20.5]", "20.5000001]");
+    let body =
+        format!("MoveJ p1,v1,z1,tGun\\WObj:=wTable;\nMoveJ p1,v1,z1,tGun\\WObj:=wNear;\nENDPROC\n{near}PROC other()");
+    let (text, run) = run(&cell, &body, &[]);
+    let run = run.expect(0);
+    assert_eq!(run.told().corrected, 2);
+    assert_all_meet(&cell, &text, &run.text("m.mod"), &[1]);
 }
 
 #[test]
@@ -118,7 +136,6 @@ fn points_to_which_no_known_move_goes_are_corrected_in_the_frames_that_are_named
         (own, vec!["--tool=0,0,9,1,0,0,0", "--work=0,0,9,1,0,0,0"], 1),
         ("CapL p1,v1,cap,tGun;", told_tool.to_vec(), 0),
         ("Grip p1;", told_tool.to_vec(), 0),
-        ("CapL p1,v1,cap,tGun\\WObj:=wTable;\nCapL p1,v1,cap,tGun\\WObj:=wobj0;", vec![], 0),
         ("PDispOn p1,tGun\\WObj:=wTable;", [told_tool, told_work].concat(), 0),
         ("pHere:=Offs(p1,0,0,9);", [told_tool, told_work].concat(), 0),
     ] {

@@ -1,7 +1,8 @@
 //! Declared positions that are no targets, or not only: frames of others, and parts of what is computed.
 
 use crate::programs_support::Cell;
-use crate::programs_support::text::krl_pose as krl;
+use crate::programs_support::text::{krl_pose as krl, script_pose};
+use robotcal::geom::Pose;
 use robotcal::programs::LeftReason;
 
 #[test]
@@ -50,4 +51,34 @@ fn what_is_computed_from_corrected_points_names_them() {
     let table = run.text("corrections.csv");
     let left = table.lines().find(|l| l.ends_with(LeftReason::Computed.name())).unwrap();
     assert_eq!(left.matches("XP1").count(), 1, "{left}");
+}
+
+/// Both uses ask for a correction of their own, and the text has one.
+#[test]
+fn points_that_are_used_with_two_tools_or_bases_stay_as_they_are_for_both() {
+    let mut cell = Cell::kuka(112);
+    let q = cell.readings();
+    let data = format!("DEFDAT a\nDECL E6POS XP1={}\nENDDAT\n", krl(&cell, &q));
+    for (base, left) in [("X 20,Y 10,Z -10,A 5,B 0,C 0", true), ("X 0.0000001,Y 0,Z 0,A 0,B 0,C 0", false)] {
+        let source = format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP XP1\n$BASE={{{base}}}\nPTP XP1\nEND\n");
+        let files = [("a.src", source), ("a.dat", data.clone())].map(|(name, text)| cell.write(name, text.as_bytes()));
+        let run = cell.compensate(&files.each_ref(), &["--unordered"]).expect(i32::from(left));
+        let told = run.told();
+        assert_eq!((told.corrected, told.left.len()), if left { (0, 1) } else { (2, 0) }, "{told:?}");
+        assert!(told.left.iter().all(|(.., reason)| reason == LeftReason::FramesDiffer.name()), "{told:?}");
+        assert_eq!(run.text("a.dat") == data, left, "{base}");
+    }
+    let mut cell = Cell::ur(113);
+    let q = cell.readings();
+    let tool = |z: f64| Pose::from_xyz_rpy([0.01, -0.02, z], [0.0; 3]);
+    let joints: Vec<String> = q.iter().map(|v| format!("{v:.8}")).collect();
+    let (joints, pose) = (joints.join(","), script_pose(&(cell.nominal.base_from_tip(&q) * tool(0.15))));
+    let text = format!(
+        "def p():\n  A={pose}\n  set_tcp(p[0.01,-0.02,0.15,0,0,0])\n  movej([{joints}])\n  movel(A)\n  set_tcp(p[0.01,-0.02,0.14,0,0,0])\n  movel(A)\nend\n"
+    );
+    let run = cell.compensate(&[&cell.write("p.script", text.as_bytes())], &["--unordered"]).expect(1);
+    let told = run.told();
+    assert_eq!((told.corrected, told.left.len()), (1, 1), "{told:?}");
+    assert_eq!(told.left[0].2, LeftReason::FramesDiffer.name());
+    assert!(run.text("p.script").contains(&format!("A={pose}\n")));
 }

@@ -300,7 +300,8 @@ pub fn table(program: &Program, done: &Compensated, expected: Option<&[Option<f6
     );
     let cell = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     let millimetres = |m: Option<f64>| m.map_or_else(String::new, |m| format!("{:.4}", 1e3 * m));
-    for (k, (t, outcome)) in program.targets.iter().zip(&done.outcomes).enumerate() {
+    let told = program.targets.iter().zip(&done.outcomes).enumerate().filter(|(k, _)| !done.is_said(program, *k));
+    for (k, (t, outcome)) in told {
         let head = format!("{},{},{}", cell(&program.files[t.file].name), t.line, cell(&t.name));
         let expected = millimetres(expected.and_then(|e| e[k]));
         let taught = millimetres(done.taught[k].map(|(_, m)| m));

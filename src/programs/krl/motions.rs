@@ -185,9 +185,8 @@ impl Module<'_> {
             pose.posture = posture_of(motion.name, pose.posture.clone());
         }
         let place = if name.is_some() { (aggregate.file, aggregate.line) } else { motion.place };
-        let clash = format!("{named} is used with different $TOOL or $BASE; give it a position for each");
-        let visited = self.way.visit(Target::at(place, named, kind), &mut self.now.1);
-        if visited { Ok(()) } else { Err(Why::new(LeftReason::FramesDiffer, clash)) }
+        self.way.visit(Target::at(place, named, kind), &mut self.now.1);
+        Ok(())
     }
 
     /// Refuses targets where the robot does not go to all that they say, or by more.

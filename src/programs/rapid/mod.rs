@@ -250,7 +250,7 @@ impl Task<'_> {
         let kind = self.kind(&value, place.0, tool.as_deref(), self.work(work));
         let about = |why: Why| Why { about: Some(named.clone()), ..why };
         let kind = kind.and_then(|kind| self.as_told(kind, name)).map_err(about);
-        Ok(kind.and_then(|kind| self.add(named, place, kind)))
+        Ok(kind.map(|kind| self.way.visit(Target::at(place, named, kind), self.switching.stands())))
     }
 
     /// The name whose numbers a name has: `CONST robtarget name:=other;`.
@@ -338,20 +338,13 @@ impl Task<'_> {
         });
         let index = self.way.program.targets.len();
         let words = if displaced.of_tool { "RelTool" } else { "Offs" };
-        self.add(format!("{words}({point})"), from, TargetKind::Pose(pose))
-            .map_err(|why| Why { about: Some(point.clone()), ..why })?;
+        let target = Target::at(from, format!("{words}({point})"), TargetKind::Pose(pose));
+        self.way.visit(target, self.switching.stands());
         // Its posture is that of the displaced point, where nothing else tells it.
         let approach = Approach::Beyond(index);
         let target = Target { approach, visited: false, ..Target::at((file, line), point.clone(), base) };
         self.bases.entry(point.clone()).or_insert(target);
         Ok(())
-    }
-
-    fn add(&mut self, name: String, place: (usize, usize), kind: TargetKind) -> Understood<()> {
-        let clash = format!("{name} is used with different tools or work objects; give it a robtarget for each");
-        let named = name.clone();
-        let visited = self.way.visit(Target::at(place, name, kind), self.switching.stands());
-        if visited { Ok(()) } else { Err(Why::of(&named, LeftReason::FramesDiffer, clash)) }
     }
 
     fn kind(

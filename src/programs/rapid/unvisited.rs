@@ -6,7 +6,6 @@ use super::uses::{Does, Use};
 use super::value::{Node, array_of, element, is_of_external_axes, is_placeholder, node};
 use super::{Datum, Task};
 use crate::error::Result;
-use crate::geom::Pose;
 use crate::programs::program::{Left, Target, TargetKind, Understood};
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::Reader;
@@ -55,29 +54,28 @@ impl Task<'_> {
         Ok(())
     }
 
-    /// What a declared target says to which no known move goes.
-    fn unvisited_kind(&self, name: &str, value: &Node, file: usize) -> Understood<TargetKind> {
+    /// What a declared target says to which no known move goes, one for each tool and work object with which it is used.
+    fn unvisited_kinds(&self, name: &str, value: &Node, file: usize) -> Understood<Vec<TargetKind>> {
         let untold = || {
             let words = "its work object is not named; give --work, and --tool where no tool is named either";
             Err(Untold::Nowhere(Why::new(LeftReason::FrameUnknown, words)))
         };
         let uses = self.uses.get(name).map(Vec::as_slice).unwrap_or_default();
-        let mut found: Option<TargetKind> = None;
+        let mut found: Vec<TargetKind> = Vec::new();
         for Use { by, does } in uses {
             let Does::Go { tool, work } = does else {
                 return Err(Why::new(LeftReason::NotATarget, format!("{by} depends on it")));
             };
             let base = work.as_ref().map_or_else(untold, |work| self.work(Some(work)));
-            let mut kind = self.kind(value, file, tool.as_deref(), base)?;
-            if found.as_ref().is_some_and(|other| frames_of(other) != frames_of(&kind)) {
-                return Err(Why::new(LeftReason::FramesDiffer, "it is used with different tools or work objects"));
+            let kind = self.kind(value, file, tool.as_deref(), base)?;
+            let known = found.iter_mut().find(|other| other.has_frames_of(&kind));
+            match (known, kind) {
+                (Some(TargetKind::Joints(before)), TargetKind::Joints(joints)) => before.again(&joints.frames),
+                (Some(_), _) => {}
+                (None, kind) => found.push(kind),
             }
-            if let (TargetKind::Joints(joints), Some(TargetKind::Joints(before))) = (&mut kind, &found) {
-                joints.again(&before.frames);
-            }
-            found = Some(kind);
         }
-        found.map_or_else(|| self.kind(value, file, None, untold()), Ok)
+        if found.is_empty() { self.kind(value, file, None, untold()).map(|kind| vec![kind]) } else { Ok(found) }
     }
 
     /// Declared targets to which no move of the files goes.
@@ -106,20 +104,13 @@ impl Task<'_> {
                 self.way.declare(base);
                 continue;
             }
-            let kind = self.unvisited_kind(&name, &value, datum.file);
-            let done = kind.map(|kind| self.way.declare(Target::at(place, name.clone(), kind)));
-            if let Err(why) = done {
-                let words = format!("no known move of the files goes there, and {}", why.words);
-                self.leave(place, &name, Why::new(LeftReason::Unvisited, words));
+            match self.unvisited_kinds(&name, &value, datum.file) {
+                Ok(kinds) => kinds.into_iter().for_each(|k| self.way.declare(Target::at(place, name.clone(), k))),
+                Err(why) => {
+                    let words = format!("no known move of the files goes there, and {}", why.words);
+                    self.leave(place, &name, Why::new(LeftReason::Unvisited, words));
+                }
             }
         }
-    }
-}
-
-/// Tool and work object of a pose.
-fn frames_of(kind: &TargetKind) -> Option<(Pose, Pose)> {
-    match kind {
-        TargetKind::Pose(pose) => Some((pose.flange_from_tool, pose.base_from_work)),
-        TargetKind::Joints(_) => None,
     }
 }

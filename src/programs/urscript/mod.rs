@@ -464,12 +464,8 @@ impl Script<'_> {
             Value::Expression => return Err(Why::computed().starting_from(argument.points)),
         };
         let target = Target::at((self.reader.index, line), name.to_owned(), kind);
-        let visited = self.way.visit(target, &mut self.now.1);
-        if visited {
-            Ok(())
-        } else {
-            Err(Why::new(LeftReason::FramesDiffer, "it is used with different tools; give it a pose for each"))
-        }
+        self.way.visit(target, &mut self.now.1);
+        Ok(())
     }
 
     /// The tool that `set_tcp` has set.
