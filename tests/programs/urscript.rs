@@ -683,3 +683,44 @@ fn what_base_and_tool_leave_is_stated_by_the_covariance_of_the_solution() {
     assert!(findings(&call(&copied, &["--solution", named.to_str().unwrap()])).contains_key("expected_error"));
     assert_eq!(call(&cell.real_urdf, &["--solution", named.to_str().unwrap()]).output.status.code(), Some(2));
 }
+
+/// The URDF for use without compensation.toml is that of the solution that lists it, and lacks what it cannot hold.
+#[test]
+fn the_urdf_that_is_used_alone_has_the_expected_error_of_its_solution_and_what_it_lacks() {
+    let (report, cell) = (repo("reports/kr6_small"), Cell::kuka(49));
+    let name = "kuka_kr6_r900.calibrated_alone.urdf";
+    let solution = std::fs::read_to_string(report.join("solution.json")).unwrap();
+    let mut solution: serde_json::Value = serde_json::from_str(&solution).unwrap();
+    // At a reading of 1 rad, a gear that errs does what an offset does.
+    let q = [0.2, -1.2, 1.0, 0.3, 0.8, 0.1];
+    let term = &mut solution["robot"]["terms"][2];
+    let offset = term["value"].as_f64().unwrap();
+    assert_eq!((term["reading"].as_str(), term["term"].as_str()), (Some("joint_a3"), Some("offset")));
+    (term["term"], term["value"]) = ("gear".into(), 0.0.into());
+    solution["files"].as_array_mut().unwrap().push(name.into());
+    cell.write("solution.json", solution.to_string().as_bytes());
+    let whole = report.join("kuka_kr6_r900.calibrated.urdf");
+    let [alone, other] = [name, "other.urdf"].map(|name| cell.write(name, &std::fs::read(&whole).unwrap()));
+    let file = cell.write("t.csv", csv(&cell.nominal.chain.readings.join(","), &[q.to_vec()]).as_bytes());
+    let call = |urdf: &std::path::Path, more: &[&std::path::Path]| {
+        let out = cell.folder.path().join("out");
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_robotcal"));
+        command.arg("compensate").arg(&file).arg("--out").arg(&out).arg("--nominal").arg(&cell.nominal_urdf);
+        command.arg("--urdf").arg(urdf).args(["--joint-unit", "rad", "--base", "base_link", "--tip", "tool0"]);
+        command.args(more);
+        crate::programs_support::Run { output: command.output().unwrap(), out, programs: Vec::new() }
+    };
+    let stated = |run: &crate::programs_support::Run| findings(run)["expected_error"].1["rms_mm"].as_f64().unwrap();
+    let by_whole = stated(&call(&whole, &[]));
+    let moved = [q[0], q[1], q[2] + offset, q[3], q[4], q[5]];
+    let lacks = 1e3 * cell.nominal.base_from_tip(&q).distance(&cell.nominal.base_from_tip(&moved)).1;
+    let named = cell.folder.path().join("solution.json");
+    let named = [std::path::Path::new("--solution"), &named];
+    for more in [&[][..], &named] {
+        let by_alone = stated(&call(&alone, more));
+        println!("alone {by_alone:.4} mm, whole {by_whole:.4} mm, lacking {lacks:.4} mm");
+        assert!((by_alone - by_whole.hypot(lacks)).abs() < 0.02 * lacks, "{by_alone} {by_whole} {lacks}");
+    }
+    assert!(findings(&call(&other, &[])).contains_key("expected_error_unknown"));
+    assert_eq!(call(&other, &named).output.status.code(), Some(2));
+}

@@ -8,6 +8,7 @@ use crate::error::{Code, Error, Result};
 use crate::files::{self, FileKind};
 use crate::geom::Pose;
 use crate::model::robot::Robot;
+use crate::output::ALONE;
 use crate::output::corrections::{self, FramedRobot, Meant};
 use crate::output::frames_record::{self, FramesRecord, ToolKind};
 use crate::output::restore::{exported_model, exported_robot};
@@ -196,7 +197,10 @@ impl Choice {
                 .map_err(Clone::clone)),
             (_, Some(_)) => Ok(Err("base and tool of both robots count, and no common frame is given".into())),
             (_, None) => Ok(match solution(&sides.to, None)? {
-                Ok(record) => Ok(corrections::expected_errors(program, done, &exported_model(&record)?)),
+                Ok(record) => {
+                    let part = part(&record, sides.to.robot);
+                    Ok(corrections::expected_errors(program, done, &exported_model(&record)?, part))
+                }
                 Err(why) => Err(why),
             }),
         }
@@ -252,7 +256,7 @@ pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<Sol
                 rad < SAME_ORIGIN && m < SAME_ORIGIN
             })
         });
-    if same {
+    if same || is_alone_of(&record, side) {
         return Ok(Ok(record));
     }
     let (what, remedy) = match base_that_differs(&exported, chain) {
@@ -269,6 +273,20 @@ pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<Sol
         Some(_) => Err(Error::new(Code::SolutionDiffers, path.display(), what, remedy)),
         None => Ok(Err(format!("{} {what}; {remedy}", path.display()))),
     }
+}
+
+/// What is judged of the model of a solution, where that is not the whole: a URDF without its compensation.toml.
+pub(super) fn part<'r>(record: &SolutionRecord, robot: &'r Robot) -> Option<&'r Robot> {
+    (robot.terms.is_empty() && record.beyond_urdf()).then_some(robot)
+}
+
+/// True for the URDF that a solution lists for use without compensation.toml, whose origins it does not hold.
+fn is_alone_of(record: &SolutionRecord, side: &Side) -> bool {
+    let name = side.urdf.file_name().and_then(|name| name.to_str()).filter(|name| name.ends_with(ALONE));
+    let chain = &side.robot.chain;
+    let is_its_robot = chain.readings == record.robot.readings && chain.tip == record.robot.tip;
+    let is_listed = name.is_some_and(|name| record.files.iter().any(|file| file == name));
+    is_listed && is_its_robot && part(record, side.robot).is_some()
 }
 
 /// The base of a solution of this robot, where that alone is another: one chain goes on where the other ends.

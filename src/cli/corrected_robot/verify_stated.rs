@@ -5,14 +5,12 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, Vector3, Vector6};
 
-use super::compensate_frames::{Side, solution};
+use super::compensate_frames::{Side, part, solution};
 use crate::assess::{
     Limits, MeasuredPoint, NORMAL_95, PredictedFlange, by_readings, fit_points, most_of_sum, root_mean_square,
 };
-use crate::cli::results::show::read_solution;
 use crate::model::joint_terms::Term;
 use crate::model::robot::{Posture, Robot};
-use crate::output::ALONE;
 use crate::output::restore::{FoundModel, exported_model, measured_series};
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::problem::{Exposures, MeasuredSeries};
@@ -49,15 +47,10 @@ impl Stated {
     pub fn beside(urdf: &Path, robot: &Robot) -> Option<Self> {
         let path = urdf.with_file_name(solution_json::FILE_NAME);
         let side = Side { robot, urdf, solution: None };
-        let (record, is_whole) = match solution(&side, None).ok()?.ok() {
-            Some(record) => {
-                let is_whole = !robot.terms.is_empty() || !record.beyond_urdf();
-                (record, is_whole)
-            }
-            None => (of_urdf_alone(&path, urdf, robot)?, false),
-        };
+        let record = solution(&side, None).ok()?.ok()?;
         let found = exported_model(&record).ok()?;
-        Some(Self { path, record, found, part: (!is_whole).then(|| robot.clone()) })
+        let part = part(&record, robot).cloned();
+        Some(Self { path, record, found, part })
     }
 
     /// Those with which the solution was judged; where none stands beside a description, the usual ones.
@@ -224,13 +217,4 @@ fn is_measurement(path: &Path) -> bool {
     let folder = text(path.parent().and_then(Path::file_name));
     let is_table = name == OBSERVATIONS || SpatialFiles::NAMES.contains(&name.as_str());
     is_table || (RECORDED.contains(&end.as_str()) && !FLAT_FIELD.contains(&folder.as_str()))
-}
-
-/// The record that lists a URDF for use without compensation.toml, whose origins it does not hold.
-fn of_urdf_alone(path: &Path, urdf: &Path, robot: &Robot) -> Option<SolutionRecord> {
-    let name = urdf.file_name()?.to_str().filter(|name| name.ends_with(ALONE))?;
-    let record = path.is_file().then(|| read_solution(path).ok())??;
-    let chain = &robot.chain;
-    let is_its_robot = chain.readings == record.robot.readings && chain.tip == record.robot.tip;
-    (is_its_robot && record.files.iter().any(|file| file == name)).then_some(record)
 }

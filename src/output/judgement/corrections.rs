@@ -11,7 +11,7 @@ use crate::error::{Code, Result};
 use crate::frames::knowledge::scatter_m;
 use crate::frames::{Knowledge, KnownRobot};
 use crate::geom::Pose;
-use crate::model::robot::Posture;
+use crate::model::robot::{Posture, Robot};
 use crate::output::restore::FoundModel;
 use crate::programs::compensate::{Compensated, RESIDUAL};
 use crate::programs::{KnownError, Left, Program, TargetKind, TargetOutcome};
@@ -138,15 +138,23 @@ pub fn missing_finding(program: &Program, left: &[Left], subject: &str) -> Optio
     is_empty.then(|| FileFinding::new(Code::TargetsMissing, Weight::Gate, subject, [], text))
 }
 
-/// Expected error of every corrected target with base and tool unknown, m.
-pub fn expected_errors(program: &Program, done: &Compensated, model: &FoundModel) -> Vec<Option<f64>> {
+/// Expected error of every corrected target with base and tool unknown, m; with what a part of the model lacks, where it was corrected by that.
+pub fn expected_errors(
+    program: &Program,
+    done: &Compensated,
+    model: &FoundModel,
+    part: Option<&Robot>,
+) -> Vec<Option<f64>> {
     let expected = |(target, outcome): (&crate::programs::Target, &TargetOutcome)| {
         let TargetOutcome::Done(c) = outcome else { return None };
         let tool = match &target.kind {
             TargetKind::Pose(pose) => pose.flange_from_tool,
             TargetKind::Joints(joints) => joints.frames[0].pose().unwrap_or_else(Pose::identity),
         };
-        Some(sigma_in_base(&model.robot, &model.layout, &model.covariance, &c.corrected, &tool))
+        let at_tool = |robot: &Robot| robot.base_from_tip(&c.corrected) * tool;
+        let lacking_m = part.map_or(0.0, |part| at_tool(part).distance(&at_tool(&model.robot)).1);
+        let sigma_m = sigma_in_base(&model.robot, &model.layout, &model.covariance, &c.corrected, &tool);
+        Some(sigma_m.hypot(lacking_m))
     };
     program.targets.iter().zip(&done.outcomes).map(expected).collect()
 }
