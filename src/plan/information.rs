@@ -170,10 +170,8 @@ pub fn candidate_information(planned: &Adjustment, setting: &Setting, candidate:
 /// `D` is the derivative of the position in the base frame; `P` takes out the rigid motion of that frame and the point on the
 /// flange, which no measurement by another device could tell from errors of its own set-up.
 pub fn flange_weight(problem: &Problem, robot: &Robot, targets: &[Vec<f64>]) -> DMatrix<f64> {
-    const GAUGE: usize = 9;
-    let (layout, rows) = (&problem.layout, 3 * targets.len());
-    let mut d = DMatrix::zeros(rows, layout.len());
-    let mut gauge = DMatrix::zeros(rows, GAUGE);
+    let layout = &problem.layout;
+    let mut d = DMatrix::zeros(3 * targets.len(), layout.len());
     for (k, readings) in targets.iter().enumerate() {
         let kinematics = robot.kinematics(&Posture::at(readings), &vec![0.0; readings.len()]);
         let tip = kinematics.base_from_tip;
@@ -185,11 +183,37 @@ pub fn flange_weight(problem: &Problem, robot: &Robot, targets: &[Vec<f64>]) -> 
             let moved: Vector3<f64> = tip.rotation * term.fixed_rows::<3>(0);
             d.view_mut((3 * k, layout.terms.start + i), (3, 1)).copy_from(&moved);
         }
+    }
+    let d = without_frames(robot, targets, d);
+    product(&d.transpose(), &d) / targets.len().max(1) as f64
+}
+
+/// Displacements of the tip at targets, three rows each, without what base frame and a point of the flange take up: `P D`.
+fn without_frames(robot: &Robot, targets: &[Vec<f64>], d: DMatrix<f64>) -> DMatrix<f64> {
+    const GAUGE: usize = 9;
+    let mut gauge = DMatrix::zeros(3 * targets.len(), GAUGE);
+    for (k, readings) in targets.iter().enumerate() {
+        let tip = robot.base_from_tip(readings);
         gauge.view_mut((3 * k, 0), (3, 3)).fill_with_identity();
         gauge.view_mut((3 * k, 3), (3, 3)).copy_from(&-skew(&tip.translation));
         gauge.view_mut((3 * k, 6), (3, 3)).copy_from(&tip.rotation);
     }
     let q = gauge.qr().q();
-    d -= &q * (q.transpose() * &d);
-    product(&d.transpose(), &d) / targets.len().max(1) as f64
+    let taken = &q * (q.transpose() * &d);
+    d - taken
+}
+
+/// Share of the mean squared displacements at targets that base frame and a point of the flange leave, for errors of all origins of as many
+/// mm as mrad.
+pub fn share_left(robot: &Robot, targets: &[Vec<f64>]) -> f64 {
+    let mut d = DMatrix::zeros(3 * targets.len(), 6 * robot.twists.len());
+    for (k, readings) in targets.iter().enumerate() {
+        let kinematics = robot.kinematics(&Posture::at(readings), &vec![0.0; readings.len()]);
+        for (i, twist) in kinematics.d_twists.iter().enumerate() {
+            let moved = kinematics.base_from_tip.rotation * twist.fixed_rows::<3>(0);
+            d.view_mut((3 * k, 6 * i), (3, 6)).copy_from(&moved);
+        }
+    }
+    let all = d.norm_squared();
+    without_frames(robot, targets, d).norm_squared() / all
 }

@@ -25,4 +25,5 @@ pub use forecast::{
     CurvePoint, Forecast, Gain, JointRange, ParameterForecast, check_demand, exact_covariance, flange_m, forecast,
     image_name,
 };
+pub use information::share_left;
 pub use places::{PlaceForecast, compare_places, place_words};

@@ -190,6 +190,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("cli/memory.rs PANIC", "exit code of a panic"),
     ("cli/memory.rs SEGMENT", "number of a signal"),
     ("cli/series/plan.rs TRIAL_CANDIDATES", "samples of a trial"),
+    ("cli/series/plan_targets.rs LEAST_SHARE", "what counts as taken up by the frames"),
     ("cli/series/plan_targets.rs LEAST_TARGETS", "unknowns of the frames"),
     ("cli/series/plan_touches.rs TRIES", "samples of a search"),
     ("cli/images/plate_board.rs LARGER", "what is drawn"),

@@ -446,30 +446,30 @@ fn too_few_targets_of_a_plan_are_refused() {
     let (_, made) = plate(folder.path(), &["--sheet", "A4", "--markers", "100"]);
     assert!(made.is_some());
     let targets = folder.path().join("targets.csv");
-    let rows = "10,-80,110,5,50,20\n20,-70,100,15,40,30\n-10,-60,90,-5,60,10\n";
-    std::fs::write(
-        &targets,
-        format!(
-            "image,joint_a1,joint_a2,joint_a3,joint_a4,joint_a5,joint_a6\n{}",
-            rows.lines().enumerate().map(|(k, r)| format!("t{k},{r}\n")).collect::<String>()
-        ),
-    )
-    .unwrap();
+    let three = ["10,-80,110,5,50,20", "20,-70,100,15,40,30", "-10,-60,90,-5,60,10"].map(str::to_owned);
+    let twelve = |row: fn(usize) -> String| (0..12).map(row).collect::<Vec<_>>();
     let (urdf, out) = (root(KR6), folder.path().join("plan"));
     let plate = folder.path().join("plate/plate.toml");
-    let output = robotcal(&[
-        "plan",
-        "--urdf",
-        &urdf,
-        "--plate",
-        plate.to_str().unwrap(),
-        "--targets",
-        targets.to_str().unwrap(),
-        "--out",
-        out.to_str().unwrap(),
-    ]);
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
-    assert!(text(&output).contains("targets.csv") && !out.exists(), "{}", text(&output));
+    let paths = [&plate, &targets, &out].map(|path| path.to_str().unwrap());
+    // Of alike ones, frame and point take up all that is wrong with the robot. The first column may name images.
+    for (rows, has_images) in [
+        (three.to_vec(), true),
+        (three.to_vec(), false),
+        (three.iter().cycle().take(12).cloned().collect(), false),
+        (twelve(|k| format!("10,-60,60,5,40,{}", 20 * k as i32 - 100)), true),
+        (twelve(|k| format!("{},-60,60,5,40,{}", 10 + 20 * (k / 4), 10 + 30 * (k % 4))), false),
+        (twelve(|k| format!("10.{k:04},-60,60,5,40,10")), false),
+    ] {
+        let joints = "joint_a1,joint_a2,joint_a3,joint_a4,joint_a5,joint_a6";
+        let lines =
+            rows.iter().enumerate().map(|(k, r)| if has_images { format!("t{k},{r}\n") } else { format!("{r}\n") });
+        let head = if has_images { format!("image,{joints}\n") } else { format!("{joints}\n") };
+        std::fs::write(&targets, head + &lines.collect::<String>()).unwrap();
+        let output =
+            robotcal(&["plan", "--urdf", &urdf, "--plate", paths[0], "--targets", paths[1], "--out", paths[2]]);
+        assert_eq!(output.status.code(), Some(2), "{rows:?} {}", text(&output));
+        assert!(text(&output).contains(Code::TargetsTooFew.name()) && !out.exists(), "{rows:?} {}", text(&output));
+    }
 }
 
 /// Programs for a robot are written by the limits.

@@ -7,7 +7,7 @@ use clap::Args;
 use clap::builder::ArgPredicate;
 use nalgebra::Vector3;
 
-use super::plan_targets::targets;
+use super::plan_targets::telling_targets;
 use super::plan_touches::{self, TouchArgs};
 use super::simulate::Mount;
 use crate::cli::Verdict;
@@ -435,7 +435,7 @@ fn request(args: &PlanArgs, record: Option<&SolutionRecord>, chain: Chain) -> Re
 
 fn demand(args: &PlanArgs, chain: &Chain) -> Result<Demand> {
     if let Some(path) = &args.targets {
-        return Ok(Demand::Targets(targets(path, chain)?));
+        return Ok(Demand::Targets(telling_targets(path, chain)?));
     }
     Ok(match (args.d_optimal, args.parameters.is_empty()) {
         (true, _) => Demand::Parameters,

@@ -1,20 +1,25 @@
 //! Joint vectors at which a robot is to be right.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::error::{Code, Error, Result};
-use crate::series::Stops;
+use crate::model::robot::Robot;
+use crate::plan::share_left;
+use crate::series::{Row, Table};
 use crate::urdf::{Chain, JointKind};
 
 /// Fewest targets whose error says something: the nine numbers of the frames take up less than a third of theirs.
 const LEAST_TARGETS: usize = 10;
 
-/// Joint vectors of a file, in degrees (m for prismatic joints), as rad and m in the order of the chain.
+/// Share of the mean squared error that the frames must leave: less is a hundredth of the error.
+const LEAST_SHARE: f64 = 1e-4;
+
+/// Joint vectors of a file, in degrees (m for prismatic joints), as rad and m in the order of the chain; rows without any are none.
 pub(super) fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
-    let stops = Stops::read(path, &mut Vec::new())?;
+    let table = Table::read(path, &mut Vec::new())?;
     let column = |name: &String| {
-        let at = stops.joints.iter().position(|j| j == name);
-        at.ok_or_else(|| {
+        table.column(name).ok_or_else(|| {
             Error::new(
                 Code::JointMissing,
                 path.display(),
@@ -24,24 +29,37 @@ pub(super) fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
         })
     };
     let columns: Vec<usize> = chain.readings.iter().map(column).collect::<Result<_>>()?;
-    let in_si = |raw: &Vec<f64>| {
-        let one = |(c, kind): (&usize, &JointKind)| {
-            if *kind == JointKind::Revolute { raw[*c].to_radians() } else { raw[*c] }
+    let in_si = |row: Row<'_>| {
+        let one = |(c, kind): (&usize, &JointKind)| -> Result<f64> {
+            let raw = table.number(row, *c)?;
+            Ok(if *kind == JointKind::Revolute { raw.to_radians() } else { raw })
         };
-        columns.iter().zip(&chain.reading_kinds).map(one).collect()
+        columns.iter().zip(&chain.reading_kinds).map(one).collect::<Result<Vec<f64>>>()
     };
-    let targets: Vec<Vec<f64>> = stops.stops.iter().filter_map(|s| s.raw_readings.as_ref()).map(in_si).collect();
-    if targets.len() < LEAST_TARGETS {
+    let rows = table.rows().filter(|row| columns.iter().any(|&c| !row.cell(c).is_empty()));
+    let targets: Vec<Vec<f64>> = rows.map(in_si).collect::<Result<_>>()?;
+    let different: BTreeSet<Vec<u64>> = targets.iter().map(|q| q.iter().map(|v| v.to_bits()).collect()).collect();
+    if different.len() < LEAST_TARGETS {
         let what = format!(
-            "{} targets are too few: base frame and a point of the flange are brought together there, which three fit exactly",
-            targets.len()
+            "{} different targets are too few: base frame and a point of the flange are brought together there, which three fit exactly",
+            different.len()
         );
-        return Err(Error::new(
-            Code::TargetsTooFew,
-            path.display(),
-            what,
-            format!("give at least {LEAST_TARGETS}, spread over where the robot works"),
-        ));
+        return Err(too_few(path, what));
     }
     Ok(targets)
+}
+
+/// Those at which base frame and a point of the flange leave an error of the robot: of others no measurement there tells one.
+pub(super) fn telling_targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
+    let targets = targets(path, chain)?;
+    if share_left(&Robot::nominal(chain.clone()), &targets) < LEAST_SHARE {
+        let what = "the targets are so alike that base frame and a point of the flange, which are brought together there, take up all errors of the robot";
+        return Err(too_few(path, what.to_owned()));
+    }
+    Ok(targets)
+}
+
+fn too_few(path: &Path, what: String) -> Error {
+    let remedy = format!("give at least {LEAST_TARGETS}, spread over where the robot works, with all joints moved");
+    Error::new(Code::TargetsTooFew, path.display(), what, remedy)
 }
