@@ -89,3 +89,36 @@ fn every_key_of_a_solution_stands_in_the_manual() {
     let missing: Vec<&String> = there.iter().filter(|key| !words.contains(key.as_str())).collect();
     assert!(missing.is_empty(), "not in guide/solution_file.md: {missing:?}");
 }
+
+/// Share, ends of its interval and letter of a two-stage fit, of a row of the table of decision 7.
+fn of_row(row: &str) -> Vec<String> {
+    let last = row.trim_end_matches([' ', '|']).rsplit('|').next().unwrap();
+    last.replace(['(', ')', ','], " ").replace(" to ", " ").split_whitespace().map(str::to_owned).collect()
+}
+
+/// The same, of the line of `identify -v` in the frozen output of a series, rounded to two places.
+fn of_output(name: &str) -> Vec<String> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name);
+    let text = fs::read_to_string(file).unwrap();
+    let line = text.lines().find(|l| l.starts_with("two-step")).unwrap();
+    let mut kinds = ["isotropic", "6x6 covariance of", "6x6 covariances", "full"].into_iter().zip(["A", "B", "C", "D"]);
+    let (_, letter) = kinds.find(|(kind, _)| line.contains(&format!("two-stage, {kind} "))).unwrap();
+    let (_, numbers) = line.split_once(") has ").unwrap();
+    let numbers = numbers.split([' ', '(', ')']).filter_map(|w| w.parse::<f64>().ok()).take(3);
+    numbers.map(|v| format!("{v:.2}")).chain([letter.to_owned()]).collect()
+}
+
+#[test]
+fn the_two_stage_fits_of_decision_7_are_those_of_the_program() {
+    let page = fs::read_to_string(src().join("guide/decisions/0007_one_stage_or_two.md")).unwrap();
+    for (series, output) in [
+        ("| Nachi, 2025-01-17 |", "nachi-2025-01-17.txt"),
+        ("| Nachi, 2025-02-04 |", "nachi-2025-02-04.txt"),
+        ("| Nachi, 2025-02-19 |", "nachi-2025-02-19.txt"),
+        ("| all three |", "nachi_together.txt"),
+        ("| Aubo, 2024-12-16 |", "aubo-2024-12-16.txt"),
+    ] {
+        let row = page.lines().find(|l| l.starts_with(series)).unwrap();
+        assert_eq!(of_row(row), of_output(output), "{series}");
+    }
+}
