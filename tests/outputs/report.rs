@@ -4,7 +4,11 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use crate::outputs_support::{context, robot, solved};
-use robotcal::diagnose::{DoubtedSize, ExchangedReadings, Finding, InOrder, OddImage, SmallGain, ToldBy, Weight};
+use robotcal::assess::{Bearer, Pattern, PatternTest};
+use robotcal::diagnose::{
+    DoubtedSize, ExchangedReadings, Finding, GivenCamera, InOrder, OddImage, ResidualPattern, SmallGain,
+    ToldBy, Weight,
+};
 use robotcal::error::{Code, Notice};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
 use robotcal::output::verdict::{Trust, Verdict, VerdictReason};
@@ -188,6 +192,36 @@ fn what_was_seen_and_what_to_do_stay_apart() {
     assert_eq!(reason(&earlier), VerdictReason { what: alone.clone(), remedy: nothing.clone() });
     record.findings.clear();
     assert_eq!(reason(&record), VerdictReason { what: alone, remedy: nothing });
+}
+
+/// A pattern may be found that is smaller than what is found nearly always.
+#[test]
+fn a_pattern_that_was_found_is_said_beside_how_often_larger_ones_are() {
+    let found = PatternTest {
+        pattern: Pattern::Radial,
+        bearer: Bearer::Camera(0),
+        statistic: 60.0,
+        degrees: 4,
+        deviate: 6.0,
+        share: 0.02,
+        rms_px: 0.0025,
+        least_px: 0.0029,
+        gain: 20.0,
+        moved: None,
+    };
+    let finding = Finding::from(ResidualPattern {
+        found,
+        bearer: "hand".into(),
+        matters: false,
+        is_fitted: false,
+        has_field: false,
+        tried: vec![],
+        given: GivenCamera::Not,
+    });
+    let said = finding.seen();
+    let from = finding.quantities().into_iter().find(|q| q.name == "found_from").unwrap();
+    assert_eq!((from.value, from.unit), (0.0029, "px"));
+    assert!(["0.0025 px", "0.0029 px 19 in 20"].iter().all(|n| said.contains(n)), "{said}");
 }
 
 #[test]
