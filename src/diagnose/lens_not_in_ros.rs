@@ -43,7 +43,7 @@ impl Kind for LensNotInRos {
     fn seen(&self) -> String {
         match self.loss_px {
             Some([rms, worst]) => format!(
-                "camera.yaml cannot express its {} lens: it is off by {rms:.3} px RMS over the image, at most {worst:.3} px",
+                "camera.yaml is off by {rms:.3} px RMS, at most {worst:.3} px: over the image it cannot express the {} lens",
                 self.lens
             ),
             None => format!("no lens of ROS comes near to its {} lens: there is no camera.yaml", self.lens),

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use crate::outputs_support::{context, robot, solved};
 use robotcal::assess::{Bearer, Pattern, PatternTest};
 use robotcal::diagnose::{
-    DoubtedSize, ExchangedReadings, Finding, GivenCamera, InOrder, OddImage, ResidualPattern, SmallGain,
+    DoubtedSize, ExchangedReadings, Finding, GivenCamera, InOrder, LensNotInRos, OddImage, ResidualPattern, SmallGain,
     ToldBy, Weight,
 };
 use robotcal::error::{Code, Notice};
@@ -181,17 +181,48 @@ fn what_was_seen_and_what_to_do_stay_apart() {
         let [one] = Verdict::of(&read).reasons.try_into().unwrap();
         one
     };
-    assert_eq!(reason(&record), VerdictReason { what: found.seen(), remedy: found.remedy() });
+    let said = |what: &str, remedy: &str| VerdictReason {
+        what: what.to_owned(),
+        remedy: remedy.to_owned(),
+        is_always_shown: false,
+    };
+    assert_eq!(reason(&record), said(&found.seen(), &found.remedy()));
     // Files of earlier versions have the sentence alone, or no findings at all.
-    let (alone, nothing) = (found.to_string(), String::new());
+    let alone = found.to_string();
     let mut earlier = serde_json::to_value(&record).unwrap();
     for field in ["seen", "remedy"] {
         earlier["findings"][0].as_object_mut().unwrap().remove(field).unwrap();
     }
     let earlier: solution_json::SolutionRecord = serde_json::from_value(earlier).unwrap();
-    assert_eq!(reason(&earlier), VerdictReason { what: alone.clone(), remedy: nothing.clone() });
+    assert_eq!(reason(&earlier), said(&alone, ""));
     record.findings.clear();
-    assert_eq!(reason(&record), VerdictReason { what: alone, remedy: nothing });
+    assert_eq!(reason(&record), said(&alone, ""));
+}
+
+#[test]
+fn what_camera_yaml_is_off_by_stands_in_the_summary_among_any_number_of_doubts() {
+    let mut record = record();
+    record.failed_gates.clear();
+    let lens = Finding::from(LensNotInRos {
+        camera: "camera_of_the_left_hand_with_a_long_name".into(),
+        lens: "brown+field",
+        loss_px: Some([0.256, 1.29]),
+        given: GivenCamera::Not,
+    });
+    let doubt = |k: usize| Notice {
+        code: Code::ImagesLeftOut,
+        place: format!("place {k}"),
+        what: "what was seen there ".repeat(k + 1),
+        remedy: "what to do about it, in so many words that no line holds them".into(),
+    };
+    for others in 0..7 {
+        record.notices = (0..others).map(doubt).chain([lens.notice()]).collect();
+        let said = robotcal::cli::summary_of(&record);
+        let summary: Vec<&str> = said.lines().take_while(|line| !line.starts_with("report")).collect();
+        assert!(summary.len() < 12 && summary.iter().all(|line| line.chars().count() <= 80), "{summary:#?}");
+        let lines: Vec<_> = summary.iter().filter(|l| l.contains("0.256 px") && l.contains("1.290 px")).collect();
+        assert_eq!(lines.len(), 1, "{others} others: {summary:#?}");
+    }
 }
 
 /// A pattern may be found that is smaller than what is found nearly always.

@@ -63,8 +63,15 @@ pub fn in_words(verdict: &Verdict) -> String {
 
 /// What was found; of a failed result the remedies stand under "next".
 fn reasons(verdict: &Verdict, most: usize) -> Vec<String> {
-    let words = |r: &VerdictReason| if verdict.trust == Trust::Failed { r.what.clone() } else { with_remedy(r) };
-    shared("          - ", &verdict.reasons.iter().map(words).collect::<Vec<_>>(), most)
+    let words = |r: &&VerdictReason| if verdict.trust == Trust::Failed { r.what.clone() } else { with_remedy(r) };
+    let mut all: Vec<&VerdictReason> = verdict.reasons.iter().collect();
+    // A line is for what is not shown; what always is comes last before it.
+    let shown = if all.len() > most { most.saturating_sub(1) } else { all.len() };
+    let hidden = |k: usize, r: &VerdictReason| k >= shown && r.is_always_shown;
+    let raised = (0..all.len()).filter(|&k| hidden(k, all[k])).count();
+    let kept = shown.saturating_sub(raised);
+    all[kept..].sort_by_key(|r| !r.is_always_shown);
+    shared("          - ", &all.iter().map(words).collect::<Vec<_>>(), most)
 }
 
 /// What was found, and what to do about it.

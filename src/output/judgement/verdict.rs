@@ -22,6 +22,14 @@ pub struct VerdictReason {
     pub what: String,
     /// What to do; empty where nothing is known.
     pub remedy: String,
+    /// True where it has a figure that is asked for wherever the result is used: it is shown however little room there is.
+    pub is_always_shown: bool,
+}
+
+impl VerdictReason {
+    fn new(what: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { what: what.into(), remedy: remedy.into(), is_always_shown: false }
+    }
 }
 
 /// The verdict on a result with its reasons, the weightiest first.
@@ -47,7 +55,7 @@ impl Verdict {
 
     /// Of poses from images alone.
     pub fn of_poses(record: &PosesRecord) -> Self {
-        let failed = record.failed().map(|f| VerdictReason { what: f.seen.clone(), remedy: f.remedy.clone() });
+        let failed = record.failed().map(|f| VerdictReason::new(&f.seen, &f.remedy));
         let failed: Vec<VerdictReason> = failed.collect();
         if !failed.is_empty() {
             return Self::failed(failed, std::iter::empty());
@@ -85,14 +93,21 @@ fn of_rows(record: &SolutionRecord) -> impl Iterator<Item = String> {
 fn of_gate(record: &SolutionRecord, sentence: &str) -> VerdictReason {
     let found = record.findings.iter().find(|f| f.text == sentence && !f.seen.is_empty());
     let (what, remedy) = found.map_or((sentence, ""), |f| (f.seen.as_str(), f.remedy.as_str()));
-    VerdictReason { what: what.to_owned(), remedy: remedy.to_owned() }
+    VerdictReason::new(what, remedy)
 }
 
 /// Notices that ask for a look.
 fn noted(notices: &[Notice]) -> impl Iterator<Item = VerdictReason> + use<> {
     let noted: Vec<Notice> = notices.iter().filter(|n| !is_information(n.code)).cloned().collect();
     let noted = Notice::said_once(&noted).into_iter();
-    noted.map(|n| VerdictReason { what: format!("{}: {}", n.place, n.what), remedy: n.remedy })
+    noted.map(|n| match n.code {
+        // The figure first: lines are cut at their ends.
+        Code::LensNotInRos => VerdictReason {
+            is_always_shown: true,
+            ..VerdictReason::new(format!("{} of {}", n.what, n.place), n.remedy)
+        },
+        _ => VerdictReason::new(format!("{}: {}", n.place, n.what), n.remedy),
+    })
 }
 
 /// Notices that tell of a choice, of what is counted among the images left out, or of what every recording has between its stops, and cast no
