@@ -336,6 +336,8 @@ limits! {
 
     /// How far, RMS, measured points may be from where a robot puts them, m: robots miss by millimetres, other robots and readings by more.
     far_points_m: f64 = 0.05;
+    /// Share of the squares of what a robot that nobody corrected misses by that points may leave open: beyond, they leave more open than they tell.
+    points_leave_open: f64 = 0.5;
     /// Error of a model in another measurement over the most that its solution states (the upper end of the 95 % interval) from which it is no
     /// longer the robot: sigmas are believed to a factor of two. Between one and this it is a doubt.
     beyond_stated: f64 = 2.0;

@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3x6, SMatrix, Vector3};
 
+use super::flange::everywhere;
 use super::mean_square::MeanSquare;
 use crate::geom::{Pose, rigid_fit, skew};
-use crate::linalg::{SymmetricFactor, product};
+use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
 use crate::model::joint_terms::LOCAL_RANGE;
 use crate::model::robot::{Posture, Robot};
 use crate::solve::Spread;
@@ -34,13 +35,40 @@ pub struct PointFit {
 /// Share of their mean by which the normal equations are held where the points do not determine frame and reflector.
 const HELD: f64 = 1e-9;
 
-/// Least squares over the base frame and the reflector point; `None` where the points do not determine them.
+/// Eigenvalue of the normal equations, with a diagonal of ones, below which a direction of frame and reflector is told by rounding alone.
+const DETERMINED: f64 = 1e-12;
+
+/// Least squares over the base frame and the reflector point; `None` where the points do not determine them as far as points of this robot can: of
+/// an arm whose axes are all parallel none tell how much of a shift along them is one of the base, and how much one of the tip.
 pub fn fit_points(robot: &Robot, points: &[MeasuredPoint]) -> Option<PointFit> {
-    fit(robot, points, 0.0)
+    let free = fit(robot, points, 0.0);
+    if free.is_some() {
+        return free;
+    }
+    let held = fit(robot, points, HELD)?;
+    let at = |readings: &[f64]| robot.base_from_tip(readings);
+    let own: Vec<Pose> = points.iter().map(|p| at(&p.readings)).collect();
+    let anywhere: Vec<Pose> = everywhere(robot).iter().map(|stop| at(&stop.readings)).collect();
+    let told = |tips: &[Pose]| told_directions(tips, &held.tip_point_m);
+    (told(&own)? == told(&anywhere)?).then_some(held)
 }
 
-/// The same where only the residuals matter: of an arm whose axes are all parallel no points tell how much of a shift along them
-/// is one of the base, and how much one of the tip.
+/// How many of the nine directions of frame and reflector points at these poses of the tip tell; `None` of nothing finite. Turns of the frame are about
+/// the middle of the points, so that their distance from the base takes nothing off.
+fn told_directions(tips: &[Pose], tip_point: &Vector3<f64>) -> Option<usize> {
+    let middle = tips.iter().map(|tip| tip.transform(tip_point)).sum::<Vector3<f64>>() / tips.len().max(1) as f64;
+    let mut n = DMatrix::<f64>::zeros(9, 9);
+    for tip in tips {
+        let centred = Pose::new(tip.rotation, tip.translation - middle);
+        let j = by_frame_and_reflector(&Pose::identity(), &centred, tip_point);
+        n += j.transpose() * j;
+    }
+    let unit: Vec<f64> = n.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
+    let scaled = DMatrix::from_fn(9, 9, |i, k| n[(i, k)] / (unit[i] * unit[k]));
+    Some(symmetric_eigen(&scaled)?.0.iter().filter(|value| **value > DETERMINED).count())
+}
+
+/// The same where only the residuals matter.
 pub(super) fn lay_over(robot: &Robot, points: &[MeasuredPoint]) -> Option<PointFit> {
     fit_points(robot, points).or_else(|| fit(robot, points, HELD))
 }
@@ -82,6 +110,9 @@ fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>, held
             break;
         }
     }
+    if held == 0.0 && told_directions(tips, &tip_point)? < 9 {
+        return None;
+    }
     let residuals_m: Vec<Vector3<f64>> =
         tips.iter().zip(points).map(|(tip, p)| p.position_m - frame.transform(&tip.transform(&tip_point))).collect();
     let rms_m = (residuals_m.iter().map(Vector3::norm_squared).sum::<f64>() / points.len() as f64).sqrt();
@@ -112,6 +143,17 @@ pub struct ExpectedRms {
     /// With the joint noise of every stop, m.
     pub with_joint_noise_m: f64,
     /// Mean squares of what the noise of every reading adds, m^2.
+    pub by_reading: Vec<f64>,
+    /// The same of single points.
+    pub of_points: Vec<ExpectedSquares>,
+}
+
+/// Expected square of the residual of a point, m^2.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExpectedSquares {
+    /// By the uncertainty of the model alone.
+    pub model: f64,
+    /// By the noise of every reading.
     pub by_reading: Vec<f64>,
 }
 
@@ -153,11 +195,17 @@ impl PointFit {
         let left = |j: &DMatrix<f64>| j - &d.fitted * normal.solve_many(&(d.fitted.transpose() * j));
         let (model, noise) = (left(&d.by_model), left(&d.by_noise));
         let n = points.len() as f64;
-        let of_model = product(&model, covariance).component_mul(&model).sum() / n;
-        let mut squares = MeanSquare::new(model.ncols());
-        (0..points.len()).for_each(|k| squares.add(&model.fixed_rows::<3>(3 * k).into_owned(), &Vector3::zeros()));
-        let [_, most_model_m] = squares.interval_m(covariance, Spread { variance: 0.0, sigma: 0.0 });
+        let squares = product(&model, covariance).component_mul(&model);
+        let of_model = squares.sum() / n;
+        let mut sums = MeanSquare::new(model.ncols());
+        (0..points.len()).for_each(|k| sums.add(&model.fixed_rows::<3>(3 * k).into_owned(), &Vector3::zeros()));
+        let [_, most_model_m] = sums.interval_m(covariance, Spread { variance: 0.0, sigma: 0.0 });
         let readings = joint_sigma.len();
+        let own = |k: usize, r: usize| noise.fixed_view::<3, 1>(3 * k, k * readings + r).norm_squared();
+        let of_point = |k: usize| ExpectedSquares {
+            model: squares.rows(3 * k, 3).sum().max(0.0),
+            by_reading: (0..readings).map(|r| own(k, r)).collect(),
+        };
         let of_reading =
             |r: usize| (0..points.len()).map(|k| noise.column(k * readings + r).norm_squared()).sum::<f64>();
         let by_reading: Vec<f64> = (0..readings).map(|r| of_reading(r) / n).collect();
@@ -167,6 +215,7 @@ impl PointFit {
             most_model_m,
             with_joint_noise_m: (of_model + of_noise).max(0.0).sqrt(),
             by_reading,
+            of_points: (0..points.len()).map(of_point).collect(),
         })
     }
 

@@ -7,6 +7,7 @@ use super::points::{Derivatives, MeasuredPoint, PointFit, by_frame_and_reflector
 use super::statistics::log_chance;
 use super::usual_errors::usual_errors;
 use crate::linalg::{SymmetricFactor, median};
+use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
 
 /// Points that miss by far more than the others.
@@ -18,32 +19,74 @@ pub struct OddPoints {
     pub off_m: Vec<f64>,
     /// The fit of the others.
     pub without: PointFit,
+    /// Those of them that no error of a robot explains: wrong points, or wrong readings.
+    pub wrong: Vec<usize>,
 }
 
-/// Points that are more than `set_aside_factor` times the median, and more than `displaced_m`, from where the others put them, with the fit of
-/// these: least squares over what is left, until it is the same. `None` where there is none, or more than a fifth.
-pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], limits: &Limits) -> Option<OddPoints> {
+/// Points that are more than `set_aside_factor` times what is usual, and more than `displaced_m`, from where the others put them, with the fit of
+/// these: least squares over what is left, until it is the same. `None` where there is none, or more than a fifth. Usual is the median of the others
+/// together with what the model is stated to miss at the point, m (`stated_m`, of every point; empty where nothing is stated).
+pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], limits: &Limits) -> Option<OddPoints> {
     let mut odd: Vec<usize> = Vec::new();
     loop {
         let kept: Vec<MeasuredPoint> =
             points.iter().enumerate().filter(|(k, _)| !odd.contains(k)).map(|(_, p)| p.clone()).collect();
         let without = fit_points(robot, &kept)?;
         let usual = median(without.residuals_m.iter().map(Vector3::norm).collect::<Vec<_>>())?;
-        let bound = (limits.set_aside_factor * usual).max(limits.displaced_m);
+        let bound = |k: usize| {
+            let usual = usual.hypot(stated_m.get(k).copied().unwrap_or_default());
+            (limits.set_aside_factor * usual).max(limits.displaced_m)
+        };
         let off_m: Vec<f64> = points.iter().map(|p| without.residual_m(robot, p).norm()).collect();
-        let found: Vec<usize> = (0..points.len()).filter(|k| off_m[*k] > bound).collect();
+        let found: Vec<usize> = (0..points.len()).filter(|k| off_m[*k] > bound(*k)).collect();
         if found.len() * limits.touches_for_one_left_out > points.len() {
             return None;
         }
         // They only grow in number, so that it ends.
         let all: Vec<usize> = (0..points.len()).filter(|k| odd.contains(k) || found.contains(k)).collect();
         if all == odd {
+            if odd.is_empty() {
+                return None;
+            }
             let off_m = odd.iter().map(|k| off_m[*k]).collect();
-            return (!odd.is_empty()).then_some(OddPoints { points: odd, off_m, without });
+            let wrong = wrong_points(robot, points, (&odd, &without), limits).unwrap_or_default();
+            return Some(OddPoints { points: odd, off_m, without, wrong });
         }
         odd = all;
     }
 }
+
+/// Those of some points that are not where the others, with the errors that robots have, let them be: the residual of a point is predicted from those of
+/// the others, and what it misses by is no chance beside what they scatter by, nor beside the noise of readings and points.
+fn wrong_points(
+    robot: &Robot,
+    points: &[MeasuredPoint],
+    (odd, without): (&[usize], &PointFit),
+    limits: &Limits,
+) -> Option<Vec<usize>> {
+    let residuals_m = points.iter().map(|p| without.residual_m(robot, p)).collect();
+    let of_all = PointFit { residuals_m, ..without.clone() };
+    let (rows, residuals) = beside_usual_errors(robot, points, &of_all, limits)?;
+    let is_kept = |k: &usize| !odd.contains(k);
+    let kept: Vec<usize> = (0..points.len()).filter(is_kept).collect();
+    let others =
+        SteppedFit::new(kept.iter().map(|k| rows[*k].clone()).collect(), kept.iter().map(|k| residuals[*k]).collect())?;
+    let freedom = (3 * kept.len()).saturating_sub(FITTED) as f64;
+    let squares = others.squares.max(freedom);
+    let most = limits.displaced_false_alarms.ln() - (points.len() as f64).ln();
+    let is_wrong = |k: &usize| {
+        others
+            .missed_by(&rows[*k], &residuals[*k])
+            .is_some_and(|missed| log_chance(missed / (missed + squares), freedom + POINT as f64, POINT) <= most)
+    };
+    Some(odd.iter().copied().filter(is_wrong).collect())
+}
+
+/// Unknowns of frame and reflector.
+const FITTED: usize = 9;
+
+/// Coordinates of a point.
+const POINT: usize = 3;
 
 /// A device, or a base of the robot, that stands elsewhere from some point on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,14 +142,21 @@ pub fn device_moved(robot: &Robot, points: &[MeasuredPoint], fit: &PointFit, lim
 /// Derivatives of a point by frame (6), reflector (3), and what else is fitted, in its sigmas.
 type Rows = Matrix3xX<f64>;
 
-/// Derivatives and residuals of points in units of their noise, those by the errors of a robot among them; `None` where there is no noise.
+/// Derivatives and residuals of points in units of their noise, those by the errors of a robot among them; `None` where there is no noise. Harmonics
+/// may be as large as an error can be of this robot at all: a joint that is mounted off its axis, or whose bearing is worn, is one robot in many, and
+/// what it does follows its reading.
 fn beside_usual_errors(
     robot: &Robot,
     points: &[MeasuredPoint],
     fit: &PointFit,
     limits: &Limits,
 ) -> Option<(Vec<Rows>, Vec<Vector3<f64>>)> {
-    let (full, sigmas) = usual_errors(robot);
+    let (full, mut sigmas) = usual_errors(robot);
+    let first = sigmas.len().saturating_sub(full.terms.len());
+    for (sigma, term) in sigmas[first..].iter_mut().zip(&full.terms) {
+        let is_harmonic = matches!(term.term, Term::Cosine(_) | Term::Sine(_));
+        *sigma *= if is_harmonic { limits.far_beyond_tolerance } else { 1.0 };
+    }
     let joint_sigma = vec![limits.joint_error_sigma; robot.chain.readings.len()];
     let (mut all, mut residuals) = (Vec::new(), Vec::new());
     for (point, residual) in points.iter().zip(&fit.residuals_m) {
@@ -137,6 +187,7 @@ struct SteppedFit {
     by: Vec<Rows>,
     residuals: Vec<Vector3<f64>>,
     normal: SymmetricFactor,
+    found: DVector<f64>,
     /// Those of the residuals, and of the errors in their sigmas.
     squares: f64,
 }
@@ -155,7 +206,16 @@ impl SteppedFit {
         let residuals: Vec<Vector3<f64>> = by.iter().zip(residuals).map(|(d, r)| r - d * &found).collect();
         let of_errors = found.rows(9, columns - 9).norm_squared();
         let squares = residuals.iter().map(Vector3::norm_squared).sum::<f64>() + of_errors;
-        Some(Self { by, residuals, normal, squares })
+        Some(Self { by, residuals, normal, found, squares })
+    }
+
+    /// Square of what a point that is not among these misses by, in units of its noise and of the uncertainty of its prediction.
+    fn missed_by(&self, rows: &Rows, residual: &Vector3<f64>) -> Option<f64> {
+        let missed = residual - rows * &self.found;
+        let by = DMatrix::from_column_slice(POINT, rows.ncols(), rows.as_slice());
+        let predicted = &by * self.normal.solve_many(&by.transpose());
+        let covariance = Matrix3::identity() + Matrix3::from_column_slice(predicted.as_slice());
+        Some(missed.dot(&covariance.cholesky()?.solve(&missed)))
     }
 
     /// Every step with so many points before it and behind it, the last one first.

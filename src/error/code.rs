@@ -318,7 +318,7 @@ codes! {
         FitUndetermined "fit_undetermined" "the data do not determine all unknowns",
         EstimateNotFinite "estimate_not_finite" "an estimate is not finite",
         NothingHeldOut "nothing_held_out" "too few images to hold any out, or none that can be predicted",
-        PointsUndetermined "points_undetermined" "measured points do not determine the frame of the device",
+        PointsUndetermined "points_undetermined" "measured points do not determine the frame of the device, or leave open most of what the robot may miss",
         PointsContradict "points_contradict" "measured points and readings do not belong together",
         CameraFileImpossible "camera_file_impossible" "no camera model of a format expresses a lens, or comes near to it",
         OriginNotWritten "origin_not_written" "an origin cannot be written into the robot description",

@@ -128,11 +128,72 @@ fn points(robot: &Robot, count: usize, noise_m: f64) -> Vec<MeasuredPoint> {
 fn one_wrong_point_is_told_from_the_others() {
     let ((_, robot), limits) = (kr6(), Limits::default());
     let mut seen = points(&robot, 40, NOISE_M);
-    assert_eq!(odd_points(&robot, &seen, &limits), None);
+    assert_eq!(odd_points(&robot, &seen, &[], &limits), None);
     seen[17].position_m.x += 5e-3;
-    let odd = odd_points(&robot, &seen, &limits).unwrap();
+    let odd = odd_points(&robot, &seen, &[], &limits).unwrap();
     assert_eq!(odd.points, [17]);
     assert!((odd.off_m[0] - 5e-3).abs() < 4.0 * NOISE_M && odd.without.rms_m < 2.5 * NOISE_M, "{odd:?}");
+    // Points in other postures all around say that no robot does this.
+    assert_eq!(odd.wrong, [17]);
+}
+
+#[test]
+fn a_point_that_misses_what_is_stated_of_the_model_there_does_not_stand_out() {
+    let ((_, robot), limits) = (kr6(), Limits::default());
+    let mut seen = points(&robot, 40, 0.2 * NOISE_M);
+    seen[17].position_m.x += 0.3e-3;
+    assert_eq!(odd_points(&robot, &seen, &[], &limits).map(|odd| odd.points), Some(vec![17]));
+    let mut stated_m = vec![2e-5; 40];
+    assert_eq!(odd_points(&robot, &seen, &stated_m, &limits).map(|odd| odd.points), Some(vec![17]));
+    stated_m[17] = 0.1e-3;
+    assert_eq!(odd_points(&robot, &seen, &stated_m, &limits), None);
+}
+
+/// A robot whose first joint is mounted off its axis, rad.
+fn eccentric(robot: &Robot) -> Robot {
+    let mut own = robot.clone();
+    own.terms.extend([(Term::Cosine(1), 1.2e-3), (Term::Sine(1), -0.9e-3)].map(|(term, value)| JointTerm {
+        reading: 0,
+        term,
+        value,
+    }));
+    own
+}
+
+#[test]
+fn true_points_where_the_robot_misses_more_than_elsewhere_count_in_the_verdict() {
+    let (_, robot) = kr6();
+    let seen: Vec<MeasuredPoint> = points(&robot, 40, 0.0)
+        .into_iter()
+        .enumerate()
+        .map(|(k, point)| {
+            let mut readings = point.readings;
+            readings[0] = 0.3 * readings[0] + if k % 10 == 3 { 2.4 } else { 0.0 };
+            let on_tip = [0.03, -0.02, 0.1].into();
+            MeasuredPoint { position_m: eccentric(&robot).base_from_tip(&readings).transform(&on_tip), readings }
+        })
+        .collect();
+    let odd = odd_points(&robot, &seen, &[], &Limits::default()).unwrap();
+    assert_eq!((odd.points.as_slice(), odd.wrong.as_slice()), (&[3, 13, 23, 33][..], &[][..]), "{:?}", odd.off_m);
+    let all_mm = 1e3 * fit_points(&robot, &seen).unwrap().rms_m;
+    assert!(1e3 * odd.without.rms_m < 0.5 * all_mm && all_mm < 1.0, "{all_mm} {}", odd.without.rms_m);
+    let found = verdict(&seen, "rad", None);
+    let text = String::from_utf8(found.stdout).unwrap();
+    println!("{text}");
+    let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let (_, judged) = words.split_once("verdict ").unwrap();
+    assert_eq!(found.status.code(), Some(0));
+    assert!(judged.contains(&format!("{all_mm:.3} mm")), "{judged}");
+}
+
+#[test]
+fn an_eccentric_joint_is_no_move_of_the_device() {
+    let ((_, robot), limits) = (kr6(), Limits::default());
+    let own = eccentric(&robot);
+    let mut seen = points(&own, 60, NOISE_M);
+    seen.sort_by(|a, b| a.readings[0].total_cmp(&b.readings[0]));
+    let found = device_moved(&robot, &seen, &fit_points(&robot, &seen).unwrap(), &limits);
+    assert!(found.is_none_or(|f| f.cause == StepCause::DeviceOrRobot), "{found:?}");
 }
 
 #[test]
@@ -479,6 +540,55 @@ fn neighbours(folder: &Path, reach: f64, sigma_m: f64, by_nominal: bool) -> Path
     file
 }
 
+/// Points of the robot of the shipped report with these joints alone moved, and with a zero that makes it miss by centimetres, or none.
+fn by_some_joints(folder: &Path, moved: &[usize], zero: f64) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let truth = Truth::read(&root.join("datasets/kr6_small/truth.toml")).unwrap();
+    let robot = truth.robot(&kr6().1.chain).unwrap();
+    let mut table = format!("x_m,y_m,z_m,{}\n", truth.joints.join(","));
+    for k in 0..20 {
+        let mut readings = truth.held_out[0].readings.clone();
+        for &j in moved {
+            readings[j] += 0.6 * (((k * (2 * j + 3) + 5 * j) % 17) as f64 - 8.0) / 8.0;
+        }
+        let mut own = readings.clone();
+        own[1] += zero;
+        let error = [1, 3, 5].map(|step| (step * k % 7) as f64 / 2.0 - 1.5);
+        let at = robot.base_from_tip(&own).transform(&[0.03, -0.02, 0.1].into()) + 2e-5 * Vector3::from(error);
+        let cells: Vec<String> = at.iter().chain(&readings).map(|v| format!("{v:.9}")).collect();
+        writeln!(table, "{}", cells.join(",")).unwrap();
+    }
+    let file = folder.join(format!("some_{moved:?}_{zero}.csv"));
+    std::fs::write(&file, table).unwrap();
+    file
+}
+
+/// Of points at which most joints stand still a frame takes up whatever these do.
+#[test]
+fn points_that_cannot_show_what_a_robot_misses_are_no_good_verdict() {
+    let report = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/kr6_small");
+    let folder = tempfile::tempdir().unwrap();
+    let judged = |points: &Path| {
+        let mut command = Command::cargo_bin("robotcal").unwrap();
+        command.args(["verify", "--joint-unit", "rad", "--urdf"]).arg(report.join("kuka_kr6_r900.calibrated.urdf"));
+        command.arg("--compensation").arg(report.join("compensation.toml"));
+        let found = command.args(["--point-sigma-m", "0.00002", "--points"]).arg(points).output().unwrap();
+        let [text, said] = [found.stdout, found.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+        println!("{text}{said}");
+        let refused = said.contains(&format!("error[{}]", Code::PointsUndetermined.name()));
+        (found.status.code(), codes(&text), refused)
+    };
+    // A circle about the last joint tells neither the frame nor the reflector.
+    for zero in [0.0, 3e-2] {
+        assert_eq!(judged(&by_some_joints(folder.path(), &[5], zero)), (Some(3), vec![], true));
+        let wrist = judged(&by_some_joints(folder.path(), &[4, 5], zero));
+        assert_eq!(wrist, (Some(1), vec![Code::PointsUndetermined], false));
+    }
+    assert_eq!(judged(&by_some_joints(folder.path(), &[0, 1, 2, 3, 4, 5], 0.0)), (Some(0), vec![], false));
+    let (exit, said, _) = judged(&by_some_joints(folder.path(), &[0, 1, 2, 3, 4, 5], 3e-2));
+    assert_eq!((exit, said), (Some(1), vec![Code::StatedExceeded]));
+}
+
 /// Of neighbouring points frame and reflector take up what two robots differ by.
 #[test]
 fn points_that_do_not_tell_a_model_from_the_nominal_robot_are_a_doubt() {
@@ -494,7 +604,8 @@ fn points_that_do_not_tell_a_model_from_the_nominal_robot_are_a_doubt() {
         (found.status.code(), codes(&text), text)
     };
     let (exit, said, text) = judged(&neighbours(folder.path(), 0.006, 5e-5, false));
-    assert_eq!((exit, said), (Some(0), vec![Code::ModelsNotTold]));
+    // Nor any other robot from it.
+    assert_eq!((exit, said), (Some(1), vec![Code::ModelsNotTold, Code::PointsUndetermined]));
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let number = |before: &str| -> f64 {
         let (front, _) = words.split_once(before).unwrap();

@@ -2,7 +2,7 @@
 //! measurements.
 //!
 //! `frames_text` is what `frames` prints; `compensate_frames` and `compensate_models` say what is known of the robots of a program; `verify` reads the flags of `verify_args`, takes what was stated
-//! from `verify_stated`, judges points itself and series in `verify_series`, and ends in `verify_verdict`; `verify_zeros` tells zeros
+//! from `verify_stated`, judges points with `verify_points` and series in `verify_series`, and ends in `verify_verdict`; `verify_zeros` tells zeros
 //! by which a model misses; `zeros` says which controller readings are of.
 
 pub mod compensate;
@@ -12,6 +12,7 @@ pub mod frames;
 mod frames_text;
 pub mod verify;
 pub mod verify_args;
+mod verify_points;
 mod verify_series;
 mod verify_stated;
 mod verify_verdict;

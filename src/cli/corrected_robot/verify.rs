@@ -8,12 +8,12 @@ use nalgebra::Vector3;
 use super::compensate_frames::Side;
 use super::compensate_models::not_given;
 use super::verify_args::VerifyArgs;
+use super::verify_points::{Laid, apart, open};
 use super::verify_series;
 use super::verify_stated::Stated;
 use super::verify_verdict::{Gain, Measured, Reasons};
 use crate::assess::{
-    DeviceMoved, Limits, MeasuredPoint, OddPoints, PointFit, ReadingMistake, StepCause, bootstrap_ratio, by_cluster,
-    device_moved, fit_points, odd_points, reading_mistake,
+    Limits, MeasuredPoint, PointFit, ReadingMistake, bootstrap_ratio, by_cluster, fit_points, reading_mistake,
 };
 use crate::cli::Verdict;
 use crate::cli::flags::joint_table::{self, Unit};
@@ -63,6 +63,10 @@ impl Judged {
         Self::of(self.robot, self.points, file)
     }
 
+    fn laid(&self) -> Laid<'_> {
+        (&self.robot, &self.points, &self.fit)
+    }
+
     /// Number of points at different readings.
     fn different(&self) -> usize {
         self.clusters.iter().max().map_or(0, |last| last + 1)
@@ -101,14 +105,12 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
         Ok(nominal)
     });
     let nominal = nominal.transpose()?;
-    let expected = stated.as_ref().and_then(|s| Some((s, s.at_points(&model.points, device_m)?)));
-    // What the model itself may miss, different in every posture, is no step of the device.
-    let may_miss = expected.as_ref().is_some_and(|(_, expected)| model.fit.rms_m <= expected.most_m);
+    let expected = stated.as_ref().and_then(|s| s.at_points(&model.points, device_m));
     let mut reasons = Reasons::default();
-    let (is_moved, odd) = apart(&model, may_miss, limits, &mut reasons);
+    let (is_moved, wrong) = apart(model.laid(), expected.as_ref(), limits, &mut reasons);
     // Wrong points are none of the robot's errors.
-    let rms_m = odd.as_ref().map_or(model.fit.rms_m, |odd| odd.without.rms_m);
-    let left_out = odd.as_ref().map_or(&[][..], |odd| &odd.points);
+    let without = (!wrong.is_empty()).then(|| model.without(&wrong)).flatten();
+    let rms_m = without.as_ref().map_or(model.fit.rms_m, |others| others.fit.rms_m);
     let different = model.different();
     if is_moved {
         reasons.against.push("the points do not belong together".into());
@@ -119,32 +121,20 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
             limits.scatter_images
         ));
     } else {
-        let gain = nominal.as_ref().and_then(|nominal| gain(&model, nominal, left_out));
+        let gain = nominal.as_ref().and_then(|nominal| gain(&model, nominal, &wrong));
         if nominal.is_some() && gain.is_none() {
             reasons.against.push("the nominal model leaves nothing".into());
         }
-        reasons.add(&Measured { urdf: &args.urdf, rms_m, stated: expected, gain }, limits);
+        let stated_here = stated.as_ref().zip(expected.map(|expected| expected.all));
+        reasons.add(&Measured { urdf: &args.urdf, rms_m, stated: stated_here, gain }, limits);
+        if !reasons.is_bad() {
+            let judged = without.as_ref().unwrap_or(&model);
+            reasons.findings.extend(open(judged.laid(), stated.as_ref(), file, limits));
+        }
     }
     let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     Ok(reasons.verdict())
-}
-
-/// Whether the device was moved, and points that do not belong with the others: both said, with the doubts that they leave.
-fn apart(model: &Judged, may_miss: bool, limits: &Limits, reasons: &mut Reasons) -> (bool, Option<OddPoints>) {
-    let moved = device_moved(&model.robot, &model.points, &model.fit, limits).filter(|_| !may_miss);
-    let is_moved = moved.is_some_and(|moved| moved.cause == StepCause::Device);
-    let odd = if is_moved { None } else { odd_points(&model.robot, &model.points, limits) };
-    moved.iter().for_each(say_moved);
-    odd.iter().for_each(say_odd);
-    reasons.doubts.extend(odd.as_ref().map(|odd| match odd.points.len() {
-        1 => "one point is wrong, or its readings".to_owned(),
-        count => format!("{count} points are wrong, or their readings"),
-    }));
-    if moved.is_some() && !is_moved {
-        reasons.doubts.push("the points may not belong together".into());
-    }
-    (is_moved, odd)
 }
 
 /// As stated; nothing where it is not.
@@ -241,28 +231,6 @@ fn refuse_far(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) -> Resu
 fn line(what: &str, urdf: &Path, Judged { fit, .. }: &Judged) -> String {
     let worst = fit.residuals_m.iter().map(Vector3::norm).fold(0.0, f64::max);
     format!("{what:<9} {}: {:.3} mm RMS, worst {:.3} mm", urdf.display(), 1e3 * fit.rms_m, 1e3 * worst)
-}
-
-fn say_moved(DeviceMoved { first, by_m, rms_m, cause }: &DeviceMoved) {
-    let [by_mm, rms_mm, row] = [format!("{:.1}", 1e3 * by_m), format!("{:.3}", 1e3 * rms_m), (first + 1).to_string()];
-    match cause {
-        StepCause::Device => say_line!(
-            "moved     the device, or the base, stands {by_mm} mm elsewhere from row {row} on (without that {rms_mm} mm RMS): judge the rows before and after alone"
-        ),
-        StepCause::DeviceOrRobot => say_line!(
-            "moved?    from row {row} on the points are {by_mm} mm elsewhere (without that {rms_mm} mm RMS), which errors of the robot may explain as well: judge the rows before and after alone, or measure in another order"
-        ),
-    }
-}
-
-fn say_odd(OddPoints { points, off_m, without }: &OddPoints) {
-    let each: Vec<String> =
-        points.iter().zip(off_m).map(|(k, off)| format!("{} ({:.1} mm)", k + 1, 1e3 * off)).collect();
-    say_line!(
-        "odd       row {}: wrong points or readings? Without {:.3} mm RMS: look at them, measure again",
-        each.join(", "),
-        1e3 * without.rms_m
-    );
 }
 
 /// For every point the number of its readings.

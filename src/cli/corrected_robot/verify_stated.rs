@@ -33,6 +33,13 @@ pub(super) struct Expectation {
     pub most_m: f64,
 }
 
+/// What a right model misses at points.
+pub(super) struct ExpectedAtPoints {
+    pub all: Expectation,
+    /// At each of them, m.
+    pub each_m: Vec<f64>,
+}
+
 /// Files of a series that hold what was measured, beside images and recordings.
 const OBSERVATIONS: &str = "observations.csv";
 /// Ends of the names of images and recordings.
@@ -89,7 +96,7 @@ impl Stated {
     }
 
     /// Of points, with the sigma per axis of the device, what the fit of frame and reflector takes up left out.
-    pub fn at_points(&self, points: &[MeasuredPoint], device_m: f64) -> Option<Expectation> {
+    pub fn at_points(&self, points: &[MeasuredPoint], device_m: f64) -> Option<ExpectedAtPoints> {
         let known = self.found.known_robot(None).ok()?;
         let robot = &self.found.robot;
         let unit = vec![1.0; self.found.joint_sigma.len()];
@@ -100,13 +107,31 @@ impl Stated {
             let on_tip = fit_points(robot, points)?.tip_point_m;
             apart_m([robot, part], &on_tip, points.iter().map(|p| p.readings.as_slice()))
         });
-        let expected = self.expectation(([left.model_m, left.most_model_m], lacking_m?), scatter_m)?;
+        let lacking_m = lacking_m?;
+        let expected = self.expectation(([left.model_m, left.most_model_m], lacking_m), scatter_m)?;
+        let each = left.of_points.iter().map(|point| {
+            let of_noise = self.scatter_m2(&point.by_reading) + self.backlash_m2(&point.by_reading, known.covariance());
+            (point.model + of_noise + lacking_m.powi(2) + 3.0 * device_m.powi(2)).sqrt()
+        });
+        let each_m = each.collect();
         // Of so many coordinates, less what frame and reflector take up.
         let count = points.len() as f64;
         let freedom = (3.0 * count - FITTED).max(1.0);
         let device_m = device_m * (freedom / count).sqrt();
         let most_m = device_m * (1.0 + NORMAL_95 / (2.0 * freedom).sqrt());
-        Some(Expectation { rms_m: expected.rms_m.hypot(device_m), most_m: expected.most_m.hypot(most_m) })
+        let all = Expectation { rms_m: expected.rms_m.hypot(device_m), most_m: expected.most_m.hypot(most_m) };
+        Some(ExpectedAtPoints { all, each_m })
+    }
+
+    /// Readings of the stops that the solution was found from, rad or m.
+    pub fn own_stops(&self) -> Vec<Vec<f64>> {
+        let own = measured_series(&self.record).unwrap_or_default();
+        own.iter().flat_map(|s| &s.stops).filter_map(|stop| stop.readings.clone()).collect()
+    }
+
+    /// Square of what joint noise does, m^2, by the mean squares that unit noise of every reading makes.
+    fn scatter_m2(&self, by_reading: &[f64]) -> f64 {
+        by_reading.iter().zip(&self.found.joint_sigma).map(|(by, sigma)| by * sigma.powi(2)).sum()
     }
 
     /// What joint noise does, RMS over so many stops, and the upper end of its 95 % interval, m: by the mean squares that unit noise of every
@@ -114,7 +139,7 @@ impl Stated {
     fn scatter_m(&self, by_reading: &[f64], stops: usize) -> [f64; 2] {
         let FoundModel { joint_sigma, joint_most, .. } = &self.found;
         let parts = || by_reading.iter().zip(joint_sigma.iter().zip(joint_most));
-        let square: f64 = parts().map(|(by, (sigma, _))| by * sigma.powi(2)).sum();
+        let square = self.scatter_m2(by_reading);
         let chance = NORMAL_95 * (2.0 / stops.max(1) as f64).sqrt() * square;
         let each = parts().map(|(by, (sigma, most))| [by * sigma.powi(2), by * most.powi(2)]);
         [square, most_of_sum(each.chain([[0.0, chance]]))].map(f64::sqrt)
@@ -151,9 +176,9 @@ impl Stated {
     /// found from, once frame and point are fitted: RMS, m.
     pub fn apart_from(&self, nominal: &Robot, on_tip: &Vector3<f64>, readings: &[Vec<f64>]) -> Option<[f64; 2]> {
         let robots = [self.part.as_ref().unwrap_or(&self.found.robot), nominal];
-        let own = measured_series(&self.record).ok()?;
-        let own = own.iter().flat_map(|s| &s.stops).filter_map(|stop| stop.readings.as_deref());
-        Some([apart_m(robots, on_tip, readings.iter().map(Vec::as_slice))?, apart_m(robots, on_tip, own)?])
+        let own = self.own_stops();
+        let apart = |at: &[Vec<f64>]| apart_m(robots, on_tip, at.iter().map(Vec::as_slice));
+        Some([apart(readings)?, apart(&own)?])
     }
 
     /// The solution.

@@ -173,6 +173,11 @@ impl Reasons {
         self.has(Code::StatedExceeded) || self.has(Code::NotCorrected)
     }
 
+    /// True where it cannot be trusted.
+    pub fn is_bad(&self) -> bool {
+        !self.against.is_empty() || self.findings.iter().any(|f| f.weight == Weight::Gate)
+    }
+
     fn has(&self, code: Code) -> bool {
         self.findings.iter().any(|f| f.code == code)
     }
@@ -186,7 +191,7 @@ impl Reasons {
         let is_own = self.has(Code::OwnMeasurement);
         let doubt = [Code::StatedExceeded, Code::ModelsNotTold].into_iter().find(|code| self.has(*code));
         let is_doubted = doubt.is_some() || !self.doubts.is_empty();
-        let is_bad = !gates.is_empty() || !self.against.is_empty();
+        let is_bad = self.is_bad();
         let word = match () {
             () if is_bad => "NOT TO BE TRUSTED",
             () if is_own => "nothing is proved",
