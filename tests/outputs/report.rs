@@ -251,8 +251,8 @@ fn a_pattern_that_was_found_is_said_beside_how_often_larger_ones_are() {
     });
     let said = finding.seen();
     let from = finding.quantities().into_iter().find(|q| q.name == "found_from").unwrap();
-    assert_eq!((from.value, from.unit), (0.0029, "px"));
-    assert!(["0.0025 px", "0.0029 px 19 in 20"].iter().all(|n| said.contains(n)), "{said}");
+    assert_eq!((from.value, from.unit.as_str()), (0.0029, "px"));
+    assert!(["0.0025 px", "0.0029 px 19 in 20"].iter().all(|name| said.contains(name)), "{said}");
 }
 
 #[test]

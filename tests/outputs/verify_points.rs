@@ -161,22 +161,23 @@ fn eccentric(robot: &Robot) -> Robot {
 }
 
 #[test]
-fn true_points_where_the_robot_misses_more_than_elsewhere_count_in_the_verdict() {
+fn a_true_point_where_the_robot_misses_more_than_elsewhere_counts_in_the_verdict() {
     let (_, robot) = kr6();
     let seen: Vec<MeasuredPoint> = points(&robot, 40, 0.0)
         .into_iter()
         .enumerate()
         .map(|(k, point)| {
             let mut readings = point.readings;
-            readings[0] = 0.3 * readings[0] + if k % 10 == 3 { 2.4 } else { 0.0 };
+            readings[0] = 0.2 * readings[0] + if k == 3 { 1.5 } else { 0.0 };
             let on_tip = [0.03, -0.02, 0.1].into();
             MeasuredPoint { position_m: eccentric(&robot).base_from_tip(&readings).transform(&on_tip), readings }
         })
         .collect();
     let odd = odd_points(&robot, &seen, &[], &Limits::default()).unwrap();
-    assert_eq!((odd.points.as_slice(), odd.wrong.as_slice()), (&[3, 13, 23, 33][..], &[][..]), "{:?}", odd.off_m);
+    assert_eq!((odd.points.as_slice(), odd.wrong.as_slice()), (&[3][..], &[][..]), "{:?}", odd.off_m);
     let all_mm = 1e3 * fit_points(&robot, &seen).unwrap().rms_m;
-    assert!(1e3 * odd.without.rms_m < 0.5 * all_mm && all_mm < 1.0, "{all_mm} {}", odd.without.rms_m);
+    // A robot that misses by 2 mm in one place alone.
+    assert!(odd.off_m[0] > 1.5e-3 && 1e3 * odd.without.rms_m < 0.5 * all_mm, "{all_mm} {}", odd.without.rms_m);
     let found = verdict(&seen, "rad", None);
     let text = String::from_utf8(found.stdout).unwrap();
     println!("{text}");
