@@ -2,8 +2,8 @@
 
 use nalgebra::DVector;
 
+use super::heaps::Heaps;
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
-use super::steps::heaps::Heaps;
 use crate::assess::{Accuracy, contradicted};
 use crate::error::Code;
 use crate::fit::Fit;
@@ -43,7 +43,8 @@ fn steadied(fit: &Fit, step: &DVector<f64>, setting: &CheckContext) -> Vec<Strin
     dense.rows_mut(0, step.len()).copy_from(step);
     let step = Step::of(dense, vec![Vec::new(); state.plates.len()], state);
     let freed = Adjustment { state: state.moved(&problem.layout, &step), problem: problem.clone() };
-    let is_loose = |by: &Adjustment, m: usize| Heaps::of_camera(fit, by, m).is_loose(setting.limits);
+    let is_loose =
+        |by: &Adjustment, m: usize| Heaps::of_camera(fit, |i| by.camera_by_readings(i), m).is_loose(setting.limits);
     let is_steadied = |m: &usize| is_loose(&fit.adjustment, *m) && !is_loose(&freed, *m);
     (0..problem.mountings.len()).filter(is_steadied).map(|m| problem.mountings[m].clone()).collect()
 }

@@ -19,6 +19,7 @@ mod few_images;
 mod finding;
 mod focus;
 mod given_camera;
+mod heaps;
 mod held_near_nominal;
 mod held_parameters;
 mod joint_noise;

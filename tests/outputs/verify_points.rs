@@ -406,7 +406,7 @@ fn left_handed_axes_and_rows_that_are_shifted_by_one_are_named() {
     for (wrong, code) in [mirrored(0), mirrored(2), (above, Code::RowsShifted), (below, Code::RowsShifted)] {
         let found = verdict(&wrong, "rad", None);
         let said = String::from_utf8_lossy(&found.stderr);
-        assert_eq!(found.status.code(), Some(2), "{said}");
+        assert_eq!(found.status.code(), Some(3), "{said}");
         assert!(said.contains(&format!("error[{}]", code.name())), "{said}");
     }
 }

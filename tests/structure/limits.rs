@@ -303,7 +303,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("problem/given.rs HUBER", "loss function of the solver"),
     ("problem/given.rs LEAST_SHARED_STOPS", "samples of a variance"),
     ("problem/plate_distance.rs UNKNOWN_SCALE", "prior that says nothing"),
-    ("problem/postures.rs FEWEST_IN_COMMON", "chance of a coincidence"),
+    ("problem/postures.rs JOINTS_IN_COMMON", "chance of a coincidence"),
     ("problem/postures.rs SAME_READING", "which postures belong together"),
     ("problem/rounding.rs DEGREE", "a unit"),
     ("problem/rounding.rs EXACT", "rounding of a unit"),

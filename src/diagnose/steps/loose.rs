@@ -3,11 +3,11 @@
 
 use super::candidates::Changed;
 use super::displaced::{Carried, Displaced, Displacement};
-use super::heaps::{Heaps, TwoPlaces};
 use super::loose_mounting::LooseMounting;
 use super::rows::{Linear, Step};
 use crate::assess::Accuracy;
 use crate::diagnose::finding::Finding;
+use crate::diagnose::heaps::{Heaps, TwoPlaces};
 use crate::diagnose::kind::{CheckContext, Weight};
 use crate::fit::Fit;
 use crate::problem::Image;
@@ -25,10 +25,11 @@ pub fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Finding> {
 /// The clearest of what a mounting shows.
 fn of_mounting(fit: &Fit, mounting: usize, setting: &CheckContext) -> Option<Finding> {
     let limits = setting.limits;
-    let camera = Heaps::of_camera(fit, &fit.adjustment, mounting).loose(limits);
+    let by_readings = |image| fit.camera_by_readings(image);
+    let camera = Heaps::of_camera(fit, by_readings, mounting).loose(limits);
     let plates = (0..fit.problem.placements.len()).filter_map(|placement| {
         let shown = |image: &Image| image.mounting == mounting && image.placement == placement;
-        let heaps = Heaps::of(fit, &fit.adjustment, shown, |seen, predicted| (predicted.inverse() * seen).log());
+        let heaps = Heaps::of(fit, by_readings, shown, |seen, predicted| (predicted.inverse() * seen).log());
         Some((placement, heaps.moved(limits)?))
     });
     let plate = plates.max_by(|a, b| a.1.clearness().total_cmp(&b.1.clearness()));

@@ -1,13 +1,12 @@
 //! What stands elsewhere at some of the stops: a plate, a camera, a tracker or the zero of a joint.
 //!
 //! ```text
-//! candidates (what may differ, and how stops are divided by it) -> rows (what a change explains, stop by stop) -> orders (which are tried); heaps (two places by turns)
+//! candidates (what may differ, and how stops are divided by it) -> rows (what a change explains, stop by stop) -> orders (which are tried)
 //!     -> pose_step, loose (the checks) -> displaced, images_shifted, zero_moved, loose_mounting (what they find)
 //! ```
 
 mod candidates;
 pub(super) mod displaced;
-pub(super) mod heaps;
 pub(super) mod images_shifted;
 pub(super) mod loose;
 pub(super) mod loose_mounting;

@@ -2,12 +2,12 @@
 
 use nalgebra::Vector6;
 
+use super::left_out::moved::CHANGES;
 use crate::assess::Limits;
-use crate::diagnose::left_out::moved::CHANGES;
 use crate::fit::Fit;
 use crate::geom::Pose;
 use crate::linalg::median;
-use crate::problem::{Adjustment, Image};
+use crate::problem::Image;
 
 /// Distance of two heaps in units of their own spread from which they are no chance.
 fn no_chance(images: usize, limits: &Limits) -> f64 {
@@ -44,7 +44,7 @@ fn split(values: &[f64], fewest: usize) -> Option<Split> {
 }
 
 /// By how much a body seems to be elsewhere in each of some images, by their index.
-pub(in crate::diagnose) struct Heaps(Vec<(usize, Vector6<f64>)>);
+pub(super) struct Heaps(Vec<(usize, Vector6<f64>)>);
 
 /// Two heaps of images.
 pub(super) struct TwoPlaces {
@@ -64,20 +64,21 @@ pub(super) struct TwoPlaces {
 }
 
 impl Heaps {
-    /// Of the camera of a mounting, by images of a fit beside what readings say in an adjustment.
-    pub fn of_camera(fit: &Fit, by: &Adjustment, mounting: usize) -> Self {
-        Self::of(fit, by, |image| image.mounting == mounting, |seen, predicted| (seen * predicted.inverse()).log())
+    /// Of the camera of a mounting, by images of a fit beside what readings say.
+    pub fn of_camera(fit: &Fit, by_readings: impl Fn(usize) -> Option<Pose>, mounting: usize) -> Self {
+        let shown = |image: &Image| image.mounting == mounting;
+        Self::of(fit, by_readings, shown, |seen, predicted| (seen * predicted.inverse()).log())
     }
 
-    /// Of some images of a fit, by the twist between where each was taken and where readings say in an adjustment.
+    /// Of some images of a fit, by the twist between where each was taken and where readings say, by its index.
     pub(super) fn of(
         fit: &Fit,
-        by: &Adjustment,
+        by_readings: impl Fn(usize) -> Option<Pose>,
         shown: impl Fn(&Image) -> bool,
         twist: impl Fn(Pose, Pose) -> Vector6<f64>,
     ) -> Self {
         let own = fit.problem.used().filter(|(i, image)| shown(image) && fit.taken_from(*i).joints() > 0);
-        let told = |(i, _)| Some((i, twist(fit.camera_from_plate(i)?, by.camera_by_readings(i)?)));
+        let told = |(i, _)| Some((i, twist(fit.camera_from_plate(i)?, by_readings(i)?)));
         Self(own.filter_map(told).collect())
     }
 
