@@ -170,11 +170,11 @@ fn stops_of_one_name_in_two_series_are_told_apart() {
     assert_eq!(found(&solution, Code::MeasurementsLeftOut).unwrap().subjects(), named);
 }
 
-/// A ball in three sockets by turns, each of which is elsewhere from a stop on.
-fn by_turns(seed: u64, from: usize, shift: Vector3<f64>) -> World {
-    let mut world = World::sockets(seed, 3, 2, 5e-5, 2e-5);
+/// A ball in so many sockets by turns, of which these are elsewhere from a stop on.
+fn by_turns(seed: u64, sockets: usize, moved: &[usize], from: usize, shift: Vector3<f64>) -> World {
+    let mut world = World::sockets(seed, sockets, 2, 5e-5, 2e-5);
     let ball = Pose::new(Matrix3::identity(), Vector3::new(0.02, -0.03, 0.11));
-    let first: Vec<SeenBody> = (0..3).map(|socket| world.series.bodies[2 * socket].clone()).collect();
+    let first: Vec<SeenBody> = (0..sockets).map(|socket| world.series.bodies[2 * socket].clone()).collect();
     let place = |seen: &SeenBody| {
         let readings = world.series.stops[seen.stop].readings.as_ref().unwrap();
         world.truth.base_from_tip(readings).transform(&ball.translation)
@@ -183,10 +183,11 @@ fn by_turns(seed: u64, from: usize, shift: Vector3<f64>) -> World {
     let mut dice = Dice::new(seed + 1000);
     let (mut stops, mut bodies) = (Vec::new(), Vec::new());
     for k in 0..60 {
-        let at = places[k % 3] + if k < from { Vector3::zeros() } else { shift };
+        let is_elsewhere = k >= from && moved.contains(&(k % sockets));
+        let at = places[k % sockets] + if is_elsewhere { shift } else { Vector3::zeros() };
         let q = (0..).find_map(|_| world.reached(&mut dice, &ball, &at)).unwrap();
         stops.push(stop(k, q));
-        bodies.push(SeenBody { stop: k, ..first[k % 3].clone() });
+        bodies.push(SeenBody { stop: k, ..first[k % sockets].clone() });
     }
     (world.series.stops, world.series.bodies) = (stops, bodies);
     // The places that the distances are between are off by the noise of one stop.
@@ -194,24 +195,42 @@ fn by_turns(seed: u64, from: usize, shift: Vector3<f64>) -> World {
     world
 }
 
-fn fixture(solution: &Solution) -> Option<&Displaced> {
-    solution.findings.iter().find_map(|finding| match finding {
-        Finding::Displaced(displaced) if displaced.body == Carried::Fixture => Some(displaced),
-        _ => None,
-    })
+fn displaced(solution: &Solution) -> Vec<&Displaced> {
+    let of = |finding| if let &Finding::Displaced(ref displaced) = finding { Some(displaced) } else { None };
+    solution.findings.iter().filter_map(of).collect()
 }
 
 #[test]
 fn sockets_that_were_pushed_together_are_named_as_their_fixture() {
     let shift = Vector3::new(1e-3, -1.5e-3, 0.8e-3);
     for seed in [94, 95] {
-        let solution = by_turns(seed, 21, shift).solve(RobotModel::Rigid);
-        let said = fixture(&solution).unwrap_or_else(|| panic!("seed {seed}: {:?}", solution.findings));
-        assert_eq!(said.images[0], "021");
+        let solution = by_turns(seed, 3, &[0, 1, 2], 21, shift).solve(RobotModel::Rigid);
+        let [said] = displaced(&solution)[..] else { panic!("seed {seed}: {:?}", solution.findings) };
+        assert_eq!((said.body, said.images[0].as_str()), (Carried::Fixture, "021"));
         assert_eq!(said.places, ["socket 0", "socket 1", "socket 2"]);
         assert!((said.distance_m.0 - shift.norm()).abs() < 5e-4, "{said:?}");
         assert_eq!(Finding::from(said.clone()).code(), Code::WorkDisplaced);
-        assert!(fixture(&by_turns(seed, 60, shift).solve(RobotModel::Rigid)).is_none());
+        assert!(displaced(&by_turns(seed, 3, &[], 0, shift).solve(RobotModel::Rigid)).is_empty());
+    }
+}
+
+/// The twist of all that fits best is none: the others stood still.
+#[test]
+fn single_sockets_that_were_pushed_are_named_and_not_those_that_stood_still() {
+    let shift = Vector3::new(1e-3, -1.5e-3, 0.8e-3);
+    for (seed, moved) in [(96, &[1][..]), (97, &[0]), (98, &[1, 2])] {
+        let solution = by_turns(seed, 4, moved, 30, shift).solve(RobotModel::Rigid);
+        let mut places = Vec::new();
+        for said in displaced(&solution) {
+            assert_eq!((said.body, said.weight), (Carried::Socket, Weight::Gate), "{said:?}");
+            assert!((said.distance_m.0 - shift.norm()).abs() < 5e-4, "{said:?}");
+            let first = (30..).find(|k| said.places[0].ends_with(&(k % 4).to_string())).unwrap();
+            assert_eq!(said.images[0], format!("{first:03}"));
+            places.extend(said.places.clone());
+        }
+        places.sort();
+        let names: Vec<String> = moved.iter().map(|socket| format!("socket {socket}")).collect();
+        assert_eq!(places, names, "seed {seed}: {:?}", solution.findings);
     }
 }
 

@@ -15,7 +15,7 @@ pub enum Changed {
     Placement(usize),
     /// The pose of a camera.
     Mounting(usize),
-    /// The frame of a tracker, or of given places.
+    /// The frame of a tracker, or of given places; a socket.
     Instrument(usize),
     /// A body on the tip.
     Target(usize),
@@ -102,7 +102,7 @@ pub(super) fn fixture(Adjustment { problem, state }: &Adjustment) -> DMatrix<f64
     all
 }
 
-fn is_socket(problem: &Problem, instrument: usize) -> bool {
+pub(super) fn is_socket(problem: &Problem, instrument: usize) -> bool {
     problem.instruments[instrument].kind == InstrumentKind::Socket
 }
 

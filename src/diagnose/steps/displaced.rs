@@ -17,8 +17,12 @@ pub enum Carried {
     CameraInHand,
     /// The camera that stands still.
     Camera,
-    /// A tracker, or what given places are fixed to.
+    /// A tracker.
     Instrument,
+    /// What given places are fixed to.
+    Places,
+    /// One socket.
+    Socket,
     /// What a tracker or a socket sees of the tip.
     Target,
     /// What holds all targets on the tip.
@@ -49,7 +53,7 @@ pub struct Displaced {
     pub series: String,
     /// What.
     pub body: Carried,
-    /// Names of the places that moved together; none where it is one body.
+    /// Names of the sockets that moved; none where it is another body.
     pub places: Vec<String>,
     /// Name of the mounting of its images, or of what measures it.
     pub mounting: String,
@@ -82,7 +86,11 @@ impl Displaced {
 
     /// True where a tracker or contacts show it, not images.
     pub(in crate::diagnose) fn is_measured(&self) -> bool {
-        matches!(self.body, Carried::Instrument | Carried::Target | Carried::Bracket | Carried::Fixture)
+        match self.body {
+            Carried::Plate | Carried::PlateInHand | Carried::CameraInHand | Carried::Camera => false,
+            Carried::Instrument | Carried::Places | Carried::Socket => true,
+            Carried::Target | Carried::Bracket | Carried::Fixture => true,
+        }
     }
 
     /// The first image in which it stands elsewhere.
@@ -97,6 +105,8 @@ impl Displaced {
             Carried::CameraInHand => "camera on its mount",
             Carried::Camera => "camera on its stand",
             Carried::Instrument => "tracker",
+            Carried::Places => "fixture of the given places",
+            Carried::Socket => "socket",
             Carried::Target => "target on the tip",
             Carried::Bracket => "bracket of all targets on the tip",
             Carried::Fixture => "fixture of all sockets",
@@ -116,7 +126,7 @@ impl Kind for Displaced {
             Carried::Camera | Carried::CameraInHand => of(Code::CameraDisplaced, Code::CameraDrifts, Code::CameraLoose),
             Carried::Instrument => of(Code::TrackerDisplaced, Code::TrackerDrifts, Code::TrackerDisplaced),
             Carried::Target | Carried::Bracket => of(Code::TargetDisplaced, Code::TargetDrifts, Code::TargetDisplaced),
-            Carried::Fixture => Code::WorkDisplaced,
+            Carried::Fixture | Carried::Places | Carried::Socket => Code::WorkDisplaced,
         }
     }
 
@@ -146,7 +156,10 @@ impl Kind for Displaced {
     }
 
     fn seen(&self) -> String {
-        let body = self.body();
+        let body = match self.body {
+            Carried::Socket => format!("{} {}", self.body(), self.places.join(", ")),
+            _ => self.body().to_owned(),
+        };
         let (far, far_sigma) = (1e3 * self.distance_m.0, 1e3 * self.distance_m.1);
         let size = match self.angle_rad {
             Some((angle, sigma)) => format!(
@@ -159,7 +172,8 @@ impl Kind for Displaced {
         let what = match self.displacement {
             Displacement::FromThenOn => {
                 let stands = match self.body {
-                    Carried::Plate | Carried::Camera | Carried::Instrument | Carried::Fixture => "stands",
+                    Carried::Plate | Carried::Camera | Carried::Instrument => "stands",
+                    Carried::Places | Carried::Socket | Carried::Fixture => "stands",
                     Carried::PlateInHand | Carried::CameraInHand | Carried::Target | Carried::Bracket => "sits",
                 };
                 let touched = match self.body {
@@ -211,6 +225,15 @@ impl Kind for Displaced {
                     "put the stops from {} on into a series of their own with another [tracker] name, or measure again",
                     self.first()
                 ),
+                Carried::Places => format!(
+                    "put the stops from {} on into a series of their own with another [contact] frame, or measure again",
+                    self.first()
+                ),
+                Carried::Socket => format!(
+                    "give contact {} another name from {} on, or fasten the socket and measure again",
+                    self.places.join(", "),
+                    self.first()
+                ),
                 Carried::Target => format!(
                     "give the target another name from {} on (of contacts, put them into a series of their own), or fasten it and measure again",
                     self.first()
@@ -236,6 +259,8 @@ impl Kind for Displaced {
                 Carried::Instrument => {
                     format!("write another name under [tracker] in the series.toml of {}", self.series)
                 }
+                Carried::Places => format!("write another frame under [contact] in the series.toml of {}", self.series),
+                Carried::Socket => format!("give contact {} another name in {}", self.places.join(", "), self.series),
                 Carried::Target => format!("give the target another name in {}", self.series),
                 Carried::Bracket => format!("give all targets other names in {}", self.series),
                 Carried::Fixture => format!("give all contacts other names in {}", self.series),

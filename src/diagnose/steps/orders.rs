@@ -1,11 +1,11 @@
 //! Which changes are tried, and at which stops; for [`super::pose_step`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use super::candidates::{Candidate, Changed, Order, Shown, stride};
-use super::rows::{Linear, Step};
-use crate::problem::{InstrumentKind, Problem};
+use super::candidates::{Candidate, Changed, Order, Shown, is_socket, stride};
+use super::rows::{Chances, Linear, Step};
+use crate::problem::Problem;
 use crate::series::CameraMount;
 
 impl Linear {
@@ -97,6 +97,36 @@ impl Linear {
         Some(step)
     }
 
+    /// The first of single sockets that moved, where fewer than all of them explain more than one twist of all does: it takes up a part of what
+    /// some of them miss, and accuses those that stood still. `tried`: what it was the best of.
+    pub(super) fn one_by_one(
+        &self,
+        problem: &Problem,
+        all: &Step,
+        tried: &[Candidate],
+        chances: Chances,
+    ) -> Option<Step> {
+        let is_single = |c: &&Candidate| matches!(c.changed, Changed::Instrument(i) if is_socket(problem, i));
+        let mut single: Vec<Candidate> = tried.iter().filter(is_single).cloned().collect();
+        let sockets = single.iter().map(|c| c.changed.columns(&problem.layout, &[]).start).collect::<BTreeSet<usize>>();
+        let of_one = (single.len() as f64).ln();
+        let (mut linear, mut first, mut told, mut more) = (None, None, 0, 0.0);
+        for _ in 1..sockets.len() {
+            let before: &Self = linear.as_ref().unwrap_or(self);
+            let step = before.most(problem, &single)?;
+            let (next, _) = before.with(problem, &step)?;
+            told += step.told;
+            single.retain(|c| c.changed != step.changed);
+            first.get_or_insert(step);
+            if self.log_chance_of(problem, &next, told, chances) + more <= all.log_chance {
+                return first;
+            }
+            more += of_one;
+            linear = Some(next);
+        }
+        None
+    }
+
     /// A change at these images and at no others.
     pub(super) fn at(&self, problem: &Problem, changed: Changed, images: &[usize]) -> Option<Candidate> {
         let is_moved = |shown: Shown| matches!(shown, Shown::Image { index, .. } if images.contains(&index));
@@ -112,12 +142,11 @@ impl Linear {
     fn what_may_change(&self, problem: &Problem) -> Vec<Changed> {
         let placements = (0..problem.placements.len()).map(Changed::Placement);
         let mountings = (0..problem.mountings.len()).map(Changed::Mounting);
-        // A socket is measured by nothing but the body in it.
-        let framed = (0..problem.instruments.len()).filter(|i| problem.instruments[*i].kind != InstrumentKind::Socket);
+        let instruments = (0..problem.instruments.len()).map(Changed::Instrument);
         let targets = (0..problem.layout.bodies.len()).map(Changed::Target);
         let zeros = (0..self.zeros.len()).map(Changed::Zero);
         let carried = targets.chain([Changed::Bracket, Changed::Fixture]);
-        placements.chain(mountings).chain(framed.map(Changed::Instrument)).chain(carried).chain(zeros).collect()
+        placements.chain(mountings).chain(instruments).chain(carried).chain(zeros).collect()
     }
 
     /// True for what the robot carries before a camera, or a camera that it carries: its weight may move it.

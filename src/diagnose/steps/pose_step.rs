@@ -20,13 +20,14 @@
 //! `T_k` of a target and `B_k = [R' , -R' [d]; 0, R']` of its rotation `R` in the tip and its place `d` from the middle.
 //!
 //! Several sockets may be on one fixture: likewise, about their middle along the axes of the base, where two of them at least hold the body on either side.
+//! It is named where steps of fewer single sockets do not explain more.
 //!
 //! Another focal length looks like a camera that moved along its axis, as far as all images are taken from one distance: where a step of it falls by
 //! more than that of plate or camera, it is named instead; and so is another principal point, as of pictures that are cut out elsewhere.
 
 use std::collections::BTreeSet;
 
-use super::candidates::{Changed, Order, Shown};
+use super::candidates::{Changed, Order, Shown, is_socket};
 use super::displaced::{Carried, Displaced, Displacement};
 use super::images_shifted::ImagesShifted;
 use super::rows::{Chances, Linear, Part, Step};
@@ -36,7 +37,7 @@ use crate::diagnose::finding::Finding;
 use crate::diagnose::focus::{self, FocusChange};
 use crate::diagnose::kind::{CheckContext, Weight};
 use crate::fit::Fit;
-use crate::problem::{Problem, stop_name};
+use crate::problem::{InstrumentKind, Problem, stop_name};
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
@@ -59,6 +60,11 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
         let log_chance = best.log_chance + (tried.len() as f64).ln();
         if log_chance > limits.displaced_false_alarms.ln() {
             break;
+        }
+        if best.changed == Changed::Fixture
+            && let Some(single) = linear.one_by_one(problem, &best, &tried, chances)
+        {
+            best = single;
         }
         if let Some(otherwise) = linear.seen_otherwise(problem, &best, limits.displaced_images) {
             best = otherwise;
@@ -172,7 +178,8 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     let (body, mounting) = carried(step.changed, first, problem)?;
     let sockets: BTreeSet<usize> = step.shown.iter().filter_map(|shown| shown.socket(problem)).collect();
     let named = |socket: usize| problem.instruments[socket].name.clone();
-    let places = sockets.into_iter().filter(|_| body == Carried::Fixture).map(named).collect();
+    let is_of_sockets = matches!(body, Carried::Fixture | Carried::Socket);
+    let places = sockets.into_iter().filter(|_| is_of_sockets).map(named).collect();
     Some(
         Displaced {
             series,
@@ -215,16 +222,21 @@ fn refocused(
 /// What stands elsewhere, and the name of its mounting, tracker or target.
 fn carried(changed: Changed, first: Shown, problem: &Problem) -> Option<(Carried, String)> {
     Some(match (changed, first) {
-        (Changed::Instrument(i), _) => (Carried::Instrument, problem.instruments[i].name.clone()),
+        (Changed::Instrument(i), _) if !is_socket(problem, i) => {
+            let instrument = &problem.instruments[i];
+            let is_tracker = instrument.kind == InstrumentKind::Tracker;
+            (if is_tracker { Carried::Instrument } else { Carried::Places }, instrument.name.clone())
+        }
         (Changed::Target(_) | Changed::Bracket, Shown::Measurement(k)) => {
             let measured = &problem.body_measurements[k];
             let body = if changed == Changed::Bracket { Carried::Bracket } else { Carried::Target };
             (body, problem.instruments[measured.instrument].name.clone())
         }
-        (Changed::Fixture, Shown::Measurement(k)) => {
+        (Changed::Fixture | Changed::Instrument(_), Shown::Measurement(k)) => {
             let component = problem.instruments[problem.body_measurements[k].instrument].component;
             let first = problem.instruments.iter().find(|i| i.component == component)?;
-            (Carried::Fixture, first.name.clone())
+            let body = if changed == Changed::Fixture { Carried::Fixture } else { Carried::Socket };
+            (body, first.name.clone())
         }
         (Changed::Placement(_) | Changed::Mounting(_), Shown::Image { index, .. }) => {
             let image = &problem.images[index];

@@ -305,15 +305,16 @@ impl Linear {
         problem: &Problem,
         tried: &[Candidate],
         of_zeros: &[Vec<f64>],
-        Chances { stops_for_one, share }: Chances,
+        chances: Chances,
     ) -> Option<Step> {
+        let Chances { stops_for_one, share } = chances;
         let covariance = SymmetricFactor::new(&self.information).ok()?.inverse();
         let squares = self.all_squares(problem);
         let chance = |explained: f64, squares: f64, told| log_chance(explained, squares / stops_for_one, told);
         let mut best =
             self.least(problem, tried.iter(), &covariance, |fall| chance(fall.cost / squares, squares, fall.told))?;
         let (next, _) = self.with(problem, &best)?;
-        best.log_chance = chance(1.0 - next.all_squares(problem) / squares, squares, best.told);
+        best.log_chance = self.log_chance_of(problem, &next, best.told, chances);
         for (group, of_readings) in of_zeros.iter().enumerate() {
             for (reading, own) in of_readings.iter().enumerate() {
                 let is_own = |c: &&Candidate| c.group == group && c.changed == Changed::Zero(reading);
@@ -331,6 +332,12 @@ impl Linear {
             }
         }
         Some(best)
+    }
+
+    /// Logarithm of the probability that noise alone leaves as little as is left `after` changes along so many directions.
+    pub(super) fn log_chance_of(&self, problem: &Problem, after: &Self, told: usize, chances: Chances) -> f64 {
+        let squares = self.all_squares(problem);
+        log_chance(1.0 - after.all_squares(problem) / squares, squares / chances.stops_for_one, told)
     }
 
     /// The step that explains most.
