@@ -70,6 +70,10 @@ pub const CHECKS: &[Check] = &[
             (Finding::Displaced(own), Finding::MeasurementsScatter(other)) => {
                 own.explains_scatter_of(&other.instrument)
             }
+            (Finding::PlaceMisstated(own), Finding::MeasurementsScatter(other)) => {
+                own.explains_scatter_of(&other.instrument)
+            }
+            (Finding::PlaceMisstated(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             _ => false,
         },
         ..check("pose_step", Stage::Fit(pose_step::check))

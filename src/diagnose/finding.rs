@@ -41,6 +41,7 @@ use super::stated_noise::NoiseContradicted;
 use super::steps::displaced::Displaced;
 use super::steps::images_shifted::ImagesShifted;
 use super::steps::loose_mounting::LooseMounting;
+use super::steps::place_misstated::PlaceMisstated;
 use super::steps::zero_moved::ZeroMoved;
 use super::tag_size::TagsOff;
 use super::tool_in_poses::ToolInPoses;
@@ -108,6 +109,7 @@ findings! {
     ObservationsLeftOut,
     OddImage,
     ParameterOff,
+    PlaceMisstated,
     RepeatedMeasurements,
     ReadingsRounded,
     ReadingRatio,

@@ -97,6 +97,7 @@ pub use stated_noise::NoiseContradicted;
 pub use steps::displaced::{Carried, Displaced, Displacement};
 pub use steps::images_shifted::ImagesShifted;
 pub use steps::loose_mounting::LooseMounting;
+pub use steps::place_misstated::PlaceMisstated;
 pub use steps::zero_moved::ZeroMoved;
 pub use tag_size::{TagsOff, tags_off};
 pub use tool_in_poses::{PosesOf, ToolInPoses};

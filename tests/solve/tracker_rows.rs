@@ -1,5 +1,6 @@
 //! Rows of a tracker that are not of their stops: shifted in part, written again, of another session, or left out at the start though they are
-//! right; and sockets that were moved together.
+//! right; sockets that were moved; and known places
+//! that are misstated.
 
 use nalgebra::{Matrix3, Vector3};
 use robotcal::Error;
@@ -7,7 +8,7 @@ use robotcal::diagnose::{Carried, Displaced, Finding, Subject, Weight};
 use robotcal::error::Code;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
-use robotcal::problem::{BodySeen, MeasuredSeries, SeenBody};
+use robotcal::problem::{BodySeen, InstrumentKind, MeasuredSeries, SeenBody};
 
 use crate::measured_worlds::{Kind, World, chain, readings, stop, truth};
 use crate::support::small::Dice;
@@ -231,6 +232,48 @@ fn single_sockets_that_were_pushed_are_named_and_not_those_that_stood_still() {
         places.sort();
         let names: Vec<String> = moved.iter().map(|socket| format!("socket {socket}")).collect();
         assert_eq!(places, names, "seed {seed}: {:?}", solution.findings);
+    }
+}
+
+/// A ball at eight places that are known in a frame of their own, touched one place after the other, as `stated` has them written.
+fn known_places(seed: u64, stated: impl Fn(&str, Vector3<f64>) -> Vector3<f64>) -> World {
+    let mut world = World::sockets(seed, 8, 6, 5e-5, 2e-5);
+    let ball = Vector3::new(0.02, -0.03, 0.11);
+    let fixture = Pose::from_xyz_rpy([0.3, 0.2, -0.1], [0.1, 0.2, 0.3]);
+    let touched = |seen: &SeenBody| {
+        let readings = world.series.stops[seen.stop].readings.as_ref().unwrap();
+        fixture.transform(&world.truth.base_from_tip(readings).transform(&ball))
+    };
+    let all: Vec<Vector3<f64>> = world.series.bodies.iter().map(touched).collect();
+    for (own, seen) in all.chunks(6).zip(world.series.bodies.chunks_mut(6)) {
+        let place = stated(&seen[0].instrument, own.iter().sum::<Vector3<f64>>() / own.len() as f64);
+        for seen in seen {
+            (seen.seen, seen.kind) = (BodySeen::Point(place), InstrumentKind::Places);
+            seen.instrument = "fixture".into();
+        }
+    }
+    world.series.lengths.clear();
+    world
+}
+
+/// Its touches come one after the other: from the last of them on the others seem to stand elsewhere.
+#[test]
+fn a_known_place_that_is_misstated_is_named_and_no_tracker() {
+    for (seed, off) in [(59, [1e-3, 0.0, 0.0]), (60, [0.0, -2e-3, 0.0]), (61, [0.0, 3e-3, 4e-3]), (62, [0.0; 3])] {
+        let off = Vector3::from(off);
+        let world = known_places(seed, |name, place| if name == "socket 3" { place + off } else { place });
+        let solution = world.solve(RobotModel::Rigid);
+        assert!(displaced(&solution).is_empty(), "seed {seed}: {:?}", solution.findings);
+        let of = |finding| if let &Finding::PlaceMisstated(ref place) = finding { Some(place) } else { None };
+        let said: Vec<_> = solution.findings.iter().filter_map(of).collect();
+        if off == Vector3::zeros() {
+            assert!(said.is_empty(), "{said:?}");
+            continue;
+        }
+        let [said] = said[..] else { panic!("seed {seed}: {:?}", solution.findings) };
+        let found = Vector3::from(said.off_m.map(|(off, _)| off));
+        assert!((found + off).norm() < 3e-4 && said.stops[0] == "018", "{said:?}");
+        assert_eq!((said.weight, Finding::from(said.clone()).code()), (Weight::Gate, Code::PlaceContradicted));
     }
 }
 

@@ -17,6 +17,8 @@ pub enum Changed {
     Mounting(usize),
     /// The frame of a tracker, or of given places; a socket.
     Instrument(usize),
+    /// Where a given place is stated to be, in its frame: that of the first measurement of it, and its instrument.
+    Place { first: usize, instrument: usize },
     /// A body on the tip.
     Target(usize),
     /// All targets on the tip together: what holds them.
@@ -41,6 +43,11 @@ impl Changed {
             Self::Placement(p) => layout.placements[p].clone(),
             Self::Mounting(m) => layout.mountings[m].clone(),
             Self::Instrument(i) => told(&layout.instruments[i]),
+            // A place that stands elsewhere in its frame is as that frame shifted where it was touched.
+            Self::Place { instrument, .. } => {
+                let start = layout.instruments[instrument].start;
+                told(&(start..start + 3))
+            }
             Self::Target(b) => told(&layout.bodies[b]),
             // No columns of their own: they move those of all targets, or sockets.
             Self::Bracket | Self::Fixture => 0..0,
@@ -115,7 +122,7 @@ pub enum Order {
     Up(usize),
     /// Not at all: it creeps with the rows.
     Drift,
-    /// Not at all: another than in the other series.
+    /// Not at all: another than in the other series, or than is stated.
     Whole,
 }
 
@@ -168,6 +175,10 @@ impl Shown {
             (Self::Image { index, .. }, Changed::Mounting(m)) => problem.images[index].mounting == m,
             (Self::Image { index, .. }, Changed::Focal(c) | Changed::Centre(c)) => problem.images[index].camera == c,
             (Self::Measurement(k), Changed::Instrument(i)) => problem.body_measurements[k].instrument == i,
+            (Self::Measurement(k), Changed::Place { first, instrument }) => {
+                let [own, first] = [k, first].map(|k| &problem.body_measurements[k]);
+                own.instrument == instrument && own.seen.position() == first.seen.position()
+            }
             (Self::Measurement(k), Changed::Target(b)) => problem.body_measurements[k].body == b,
             (Self::Measurement(k), Changed::Bracket) => is_by_tracker(problem, &problem.body_measurements[k]),
             (Self::Measurement(k), Changed::Fixture) => is_socket(problem, problem.body_measurements[k].instrument),

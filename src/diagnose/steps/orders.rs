@@ -5,13 +5,35 @@ use std::rc::Rc;
 
 use super::candidates::{Candidate, Changed, Order, Shown, is_socket, stride};
 use super::rows::{Chances, Linear, Step};
-use crate::problem::Problem;
+use crate::problem::{InstrumentKind, Problem};
 use crate::series::CameraMount;
 
 impl Linear {
     /// Ways to divide the stops, with at least so many of them on either side.
     pub(super) fn candidates(&self, problem: &Problem, fewest: usize) -> Vec<Candidate> {
-        self.what_may_change(problem).into_iter().flat_map(|changed| self.divisions(problem, changed, fewest)).collect()
+        let changed = self.what_may_change(problem).into_iter();
+        let divided = changed.flat_map(|changed| self.divisions(problem, changed, fewest));
+        divided.chain(self.misstated(problem)).collect()
+    }
+
+    /// Given places that were touched more than once, each at all its touches: a single one may as well be another than is said.
+    fn misstated(&self, problem: &Problem) -> Vec<Candidate> {
+        let mut all: Vec<Candidate> = Vec::new();
+        for (first, measured) in problem.used_bodies() {
+            let (changed, instrument) =
+                (Changed::Place { first, instrument: measured.instrument }, &problem.instruments[measured.instrument]);
+            let is_known = |c: &Candidate| matches!(c.changed, Changed::Place { first: other, .. } if Shown::Measurement(other).tells_of(problem, changed));
+            if instrument.kind != InstrumentKind::Places || all.iter().any(is_known) {
+                continue;
+            }
+            let telling = |r: &usize| self.rows[*r].of(problem, changed).next().is_some();
+            let rows: Vec<usize> = (0..self.rows.len()).filter(telling).collect();
+            if let [row, _, ..] = rows[..] {
+                let group = self.rows[row].group;
+                all.push(Candidate { changed, order: Order::Whole, group, rows: Rc::new(rows), from: 0, fewest: 0 });
+            }
+        }
+        all
     }
 
     /// Those by one change.

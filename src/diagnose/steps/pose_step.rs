@@ -1,5 +1,5 @@
 //! A plate, a camera, a tracker or its target that stands elsewhere from some stop on, creeps all through a series or differs between series,
-//! or a joint whose zero does, by too little for anything to be left out.
+//! a joint whose zero does, or a given place that is misstated, by too little for anything to be left out.
 //!
 //! Rao's score test on the linearised fit: what the images of a stop tell of their poses, joint noise eliminated, has the root score `s` and
 //! the derivatives `T` by all columns ([`StopInformation`]). Let the pose of one body differ by a constant `x` at the stops of a part `P` of a
@@ -22,6 +22,8 @@
 //! Several sockets may be on one fixture: likewise, about their middle along the axes of the base, where two of them at least hold the body on either side.
 //! It is named where steps of fewer single sockets do not explain more.
 //!
+//! A given place that is misstated is, at its touches, as its frame shifted along its axes: `x` of three components.
+//!
 //! Another focal length looks like a camera that moved along its axis, as far as all images are taken from one distance: where a step of it falls by
 //! more than that of plate or camera, it is named instead; and so is another principal point, as of pictures that are cut out elsewhere.
 
@@ -30,6 +32,7 @@ use std::collections::BTreeSet;
 use super::candidates::{Changed, Order, Shown, is_socket};
 use super::displaced::{Carried, Displaced, Displacement};
 use super::images_shifted::ImagesShifted;
+use super::place_misstated::PlaceMisstated;
 use super::rows::{Chances, Linear, Part, Step};
 use super::zero_moved::ZeroMoved;
 use crate::assess::{Accuracy, Limits, log_chance as chance_of_share, stops_for_one};
@@ -128,11 +131,13 @@ impl Squares {
         let group = step.group;
         let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
         let of_poses = share(self.poses[group], after.poses[group]);
+        let of_bodies = || {
+            let parts = self.bodies.iter().zip(&after.bodies);
+            parts.map(|(before, after)| share(before[group], after[group])).fold(0.0, f64::max)
+        };
         let of_part = match step.changed {
-            Changed::Instrument(_) | Changed::Target(_) | Changed::Bracket | Changed::Fixture => {
-                let parts = self.bodies.iter().zip(&after.bodies);
-                parts.map(|(before, after)| share(before[group], after[group])).fold(0.0, f64::max)
-            }
+            Changed::Instrument(_) | Changed::Place { .. } => of_bodies(),
+            Changed::Target(_) | Changed::Bracket | Changed::Fixture => of_bodies(),
             Changed::Zero(reading) => share(self.zeros[group][reading], after.zeros[group][reading]),
             _ => 0.0,
         };
@@ -171,6 +176,10 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     }
     if let Changed::Centre(camera) = step.changed {
         return Some(ImagesShifted::of(step, problem, camera, images).into());
+    }
+    if let Changed::Place { first, .. } = step.changed {
+        let matters = step.size(0).0 > limits.displaced_m;
+        return Some(PlaceMisstated::of(step, problem, first, (series, images), weight(matters)).into());
     }
     let (distance_m, angle_rad) = (step.size(0), (step.change.len() > 3).then(|| step.size(3)));
     let matters = distance_m.0 > limits.displaced_m || angle_rad.is_some_and(|angle| angle.0 > limits.displaced_rad);
