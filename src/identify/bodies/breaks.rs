@@ -5,8 +5,11 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::misfit::usual_misfit;
+use super::mistakes::mistake;
 use super::points_start::{FEWEST_POINTS, Placed, PointAt, distances, each_place, point_at, usual_distance};
 use crate::assess::Limits;
+use crate::diagnose::Finding;
 use crate::error::{Code, Error, Quantity, Result};
 use crate::geom::{Pose, rigid_fit};
 use crate::identify::mistakes::parts::divided;
@@ -15,35 +18,48 @@ use crate::problem::{Adjustment, BodySeen, InstrumentKind, MeasuredSeries, stop_
 /// Of the rows that others do not fit, one in so many may.
 const MOST_MISSED: usize = 4;
 
-/// Refuses measurements of which some at one end fit by themselves, and by the start of the others do not. Poses start from most of them, so that the
-/// fit names the stop; they are refused where the start is of no majority.
+/// Refuses measurements that fit in two parts, by the usual mistake that explains more, if there is one.
 ///
 /// # Errors
-/// An instrument or a body that was moved, with the stop.
+/// An instrument or a body that was moved, with the stop; or the mistake.
 pub(super) fn name_break(
     adjustment: &Adjustment,
     series: &[MeasuredSeries],
     (measured, placed): (&[usize], &Placed),
     limits: &Limits,
 ) -> Result<()> {
+    let Some((broken, left)) = broken(adjustment, series, (measured, placed), limits) else { return Ok(()) };
+    let mistake = mistake(adjustment, measured, limits, usual_misfit);
+    let better = mistake.filter(|mistake| mistake.misfit_undone.is_some_and(|undone| undone < left));
+    Err(better.map_or(broken, |mistake| Finding::from(mistake).refusal()))
+}
+
+/// What stands elsewhere where measurements at one end fit by themselves, and by the start of the others do not; and what they miss by then, m. Poses
+/// start from most of them, so that the fit names the stop; they are told here where the start is of no majority.
+fn broken(
+    adjustment: &Adjustment,
+    series: &[MeasuredSeries],
+    (measured, placed): (&[usize], &Placed),
+    limits: &Limits,
+) -> Option<(Error, f64)> {
     let problem = &adjustment.problem;
     let of = |&k: &usize| Some((k, point_at(adjustment, &problem.body_measurements[k])?));
     let (rows, points): (Vec<usize>, Vec<PointAt>) = measured.iter().filter_map(of).unzip();
     let bound = limits.suspicious_misfit;
     let are_poses = rows.iter().any(|&k| matches!(problem.body_measurements[k].seen, BodySeen::Pose(_)));
     if are_poses && usual_distance(&points, placed) < bound {
-        return Ok(());
+        return None;
     }
     let fits: Vec<bool> = distances(&points, placed).iter().map(|distance| *distance < bound).collect();
     let n = fits.len();
     let divisions = [true, false].map(|is_first| (divided(&fits, is_first), is_first));
-    let Some(((missed, at), is_first)) = divisions.into_iter().min() else { return Ok(()) };
+    let ((missed, at), is_first) = divisions.into_iter().min()?;
     let others: Range<usize> = if is_first { at..n } else { 0..at };
     if others.is_empty() || MOST_MISSED * missed > others.len() || n - others.len() < 2 * FEWEST_POINTS {
-        return Ok(());
+        return None;
     }
-    let Some(moved) = moved(&points[others], placed, limits) else { return Ok(()) };
-    Err(moved.named(adjustment, series, (rows[at - 1], rows[at])))
+    let moved = moved(&points[others], placed, limits)?;
+    Some((moved.named(adjustment, series, (rows[at - 1], rows[at])), moved.left_m))
 }
 
 /// What stands elsewhere.
@@ -51,22 +67,24 @@ struct Moved {
     is_body: bool,
     distance_m: f64,
     angle_rad: f64,
+    /// What is missed by then, median.
+    left_m: f64,
 }
 
 /// What explains that points miss where the others are placed: another place of the body on the tip, else of the instrument.
 fn moved(points: &[PointAt], placed: &Placed, limits: &Limits) -> Option<Moved> {
     let before = usual_distance(points, placed);
-    let explains = |other: &Placed| {
+    let left_by = |other: &Placed| {
         let left = usual_distance(points, other);
-        left < limits.suspicious_misfit && left < limits.mistake_explains * before
+        (left < limits.suspicious_misfit && left < limits.mistake_explains * before).then_some(left)
     };
     let (frame, body) = placed;
     let on_tip = |(p, tip): &PointAt| tip.inverse().transform(&frame.transform(p));
     let middle = points.iter().map(on_tip).sum::<Vector3<f64>>() / points.len().max(1) as f64;
     let other_body = (*frame, Pose::new(Matrix3::identity(), middle));
-    if points.len() >= limits.displaced_images && explains(&other_body) {
+    if let Some(left_m) = left_by(&other_body).filter(|_| points.len() >= limits.displaced_images) {
         let distance_m = (middle - body.translation).norm();
-        return Some(Moved { is_body: true, distance_m, angle_rad: 0.0 });
+        return Some(Moved { is_body: true, distance_m, angle_rad: 0.0, left_m });
     }
     let carried: Vec<(Vector3<f64>, Vector3<f64>)> =
         points.iter().map(|(p, tip)| (*p, tip.transform(&body.translation))).collect();
@@ -74,7 +92,7 @@ fn moved(points: &[PointAt], placed: &Placed, limits: &Limits) -> Option<Moved> 
     let is_told = points.len() >= limits.hand_eye_images && places >= limits.fewest_places;
     let other_frame = rigid_fit(&carried).filter(|_| is_told)?;
     let (angle_rad, distance_m) = frame.distance(&other_frame);
-    explains(&(other_frame, *body)).then_some(Moved { is_body: false, distance_m, angle_rad })
+    left_by(&(other_frame, *body)).map(|left_m| Moved { is_body: false, distance_m, angle_rad, left_m })
 }
 
 impl Moved {
@@ -87,9 +105,9 @@ impl Moved {
     ) -> Error {
         let [last, first] = [last, first].map(|k| &problem.body_measurements[k]);
         let instrument = &problem.instruments[first.instrument];
-        let block = match instrument.kind {
-            InstrumentKind::Tracker => "tracker",
-            InstrumentKind::Socket | InstrumentKind::Places => "contact",
+        let (displaced, other) = match instrument.kind {
+            InstrumentKind::Tracker => (Code::TrackerDisplaced, "[tracker] name"),
+            InstrumentKind::Socket | InstrumentKind::Places => (Code::WorkDisplaced, "[contact] frame"),
         };
         let own = &series[first.read.0];
         let stop = stop_name(series, first.read);
@@ -109,9 +127,9 @@ impl Moved {
                 ),
             ),
             false => (
-                Code::TrackerDisplaced,
+                displaced,
                 format!("{from} it stands {:.0} mm, {:.0} mrad elsewhere", 1e3 * self.distance_m, 1e3 * self.angle_rad),
-                format!("{rows} another [{block}] name, or measure again"),
+                format!("{rows} another {other}, or measure again"),
             ),
         };
         let what = format!(

@@ -23,8 +23,7 @@ use crate::problem::{Adjustment, BodyMeasurement, BodySeen, InstrumentKind, Prob
 /// What was seen with a mistake undone, and its name.
 type Undone = (Vec<SeenAt>, MistakeKind);
 
-/// Refuses measurements and readings that fit with one of the usual mistakes undone, and only then. `misfit` is the median misfit of poses
-/// (rad + m), or of points (m), with given readings; what shrinks them counts by what it leaves of it in their own unit. A small one may have a mistake, too: the sign of a joint moves a body near its axis by little.
+/// Refuses measurements and readings that fit with one of the usual mistakes undone, and only then.
 ///
 /// # Errors
 /// The mistake that explains most.
@@ -34,6 +33,17 @@ pub(super) fn name_mistake(
     limits: &Limits,
     misfit: impl Fn(&Robot, &[SeenAt]) -> f64 + Sync,
 ) -> Result<()> {
+    mistake(adjustment, measured, limits, misfit).map_or(Ok(()), |mistake| Err(Finding::from(mistake).refusal()))
+}
+
+/// The usual mistake without which measurements and readings fit, and only then. `misfit` is the median misfit of poses
+/// (rad + m), or of points (m), with given readings; what shrinks them counts by what it leaves of it in their own unit. A small one may have a mistake, too: the sign of a joint moves a body near its axis by little.
+pub(super) fn mistake(
+    adjustment: &Adjustment,
+    measured: &[usize],
+    limits: &Limits,
+    misfit: impl Fn(&Robot, &[SeenAt]) -> f64 + Sync,
+) -> Option<Mistake> {
     let Adjustment { problem, state } = adjustment;
     let robot = &state.robot;
     let mut given: Vec<SeenAt> =
@@ -43,7 +53,7 @@ pub(super) fn name_mistake(
     if !(is_suspicious || is_contradicted(problem, measured, of_all, limits))
         || robot.chain.pose_coordinates().is_some()
     {
-        return Ok(());
+        return None;
     }
     let stops: Vec<usize> = given.iter().map(|s| s.stop).collect::<BTreeSet<usize>>().into_iter().collect();
     if !is_suspicious {
@@ -75,13 +85,11 @@ pub(super) fn name_mistake(
         *left < limits.mistake_explains * told_by && left * shrinks(kind) < limits.suspicious_misfit
     };
     let explaining: Vec<Explained> = tried.filter(explains).collect();
-    likeliest(&explaining, robot, limits).map_or(Ok(()), |(named, kind)| {
-        let left = explaining[named].0 * shrinks(&explaining[named].1);
-        let of = instrument.place();
-        let rows_of = rows_of_bodies(adjustment, measured, limits);
-        let mistake = Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of };
-        Err(Finding::from(mistake).refusal())
-    })
+    let (named, kind) = likeliest(&explaining, robot, limits)?;
+    let left = explaining[named].0 * shrinks(&explaining[named].1);
+    let of = instrument.place();
+    let rows_of = rows_of_bodies(adjustment, measured, limits);
+    Some(Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of })
 }
 
 /// True for a mistake without which the arm hardly moves: places that hardly differ do not tell it from one that turns about them.
