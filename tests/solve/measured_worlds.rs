@@ -81,6 +81,9 @@ pub fn with_ball_at(
     None
 }
 
+/// The ball on the tip, m.
+const BALL: [f64; 3] = [0.02, -0.03, 0.11];
+
 impl World {
     pub fn new(seed: u64, kind: Kind, stops: usize, sigmas: (f64, f64), noise_rad: f64) -> Self {
         let mut dice = Dice::new(seed);
@@ -158,7 +161,7 @@ impl World {
         let mut dice = Dice::new(seed);
         let chain = chain();
         let truth = truth(&mut dice, &chain);
-        let ball = Pose::new(nalgebra::Matrix3::identity(), Vector3::new(0.02, -0.03, 0.11));
+        let ball = Pose::new(nalgebra::Matrix3::identity(), BALL.into());
         let mut world =
             Self { series: MeasuredSeries::without_images("run", true, Vec::new()), truth, chain, sigma_m, noise_rad };
         let mut centres = Vec::new();
@@ -192,6 +195,25 @@ impl World {
             });
         }
         world
+    }
+
+    /// Where the true robot has the ball at what was measured, the noise of the stop included.
+    pub fn ball_at(&self, seen: &SeenBody) -> Vector3<f64> {
+        let readings = self.series.stops[seen.stop].readings.as_ref().unwrap();
+        self.truth.base_from_tip(readings).transform(&BALL.into())
+    }
+
+    /// The ball in these sockets instead, by their names and places, one stop after the other.
+    pub fn put(&mut self, dice: &mut Dice, touched: impl Iterator<Item = (String, Vector3<f64>)>) {
+        let ball = Pose::new(nalgebra::Matrix3::identity(), BALL.into());
+        let first = self.series.bodies[0].clone();
+        let (mut stops, mut bodies) = (Vec::new(), Vec::new());
+        for (k, (instrument, place)) in touched.enumerate() {
+            let q = (0..).find_map(|_| self.reached(dice, &ball, &place)).unwrap();
+            stops.push(stop(k, q));
+            bodies.push(SeenBody { stop: k, instrument, ..first.clone() });
+        }
+        (self.series.stops, self.series.bodies) = (stops, bodies);
     }
 
     /// Readings with which the true robot, its joint errors included, has the ball in the socket up to its noise.
