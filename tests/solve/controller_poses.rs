@@ -366,6 +366,8 @@ fn images_tell_a_user_frame_from_mistakes_in_the_poses() {
     let in_frame = moved(&|p| of_frame * *p);
     let wpr = |p: &Pose| p.rpy().map(f64::to_degrees).to_vec();
     let right = &poses[30..];
+    let exchanged = moved(&|p| Pose::new(p.rotation, nalgebra::Vector3::new(p.xyz()[1], p.xyz()[0], p.xyz()[2])));
+    let shifted: Vec<_> = right.iter().zip(&right[1..]).map(|((i, _), (_, below))| (i.clone(), *below)).collect();
     let refused = |folder: &TempDir, is_stated: bool| {
         if is_stated {
             let path = folder.path().join("series.toml");
@@ -378,8 +380,10 @@ fn images_tell_a_user_frame_from_mistakes_in_the_poses() {
     let quantity = |name: &str| unreached.quantities.iter().find(|q| q.name == name).unwrap().value;
     assert_eq!(unreached.code, Code::PoseOutOfReach, "{unreached}");
     assert!(quantity("reached") < quantity("tried"), "{unreached}");
-    let cases: [(TempDir, Code); 4] = [
+    let cases: [(TempDir, Code); 6] = [
         (series("quaternion", "qx,qy,qz,qw", &in_frame, quaternion), Code::SettingConflict),
+        (series("quaternion", "qx,qy,qz,qw", &exchanged, quaternion), Code::AxesMirrored),
+        (series("quaternion", "qx,qy,qz,qw", &shifted, quaternion), Code::RowsShifted),
         (series("abc_deg", "a,b,c", right, wpr), Code::RotationConvention),
         (series("zyz_deg", "o,a,t", right, xyz_deg), Code::RotationConvention),
         // Of a kind that is not known none is named.

@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::told::{ReadAs, Told};
+use super::told::{Misplaced, ReadAs, Told};
 use crate::error::{Code, Error, Notice, Quantity, Result};
 use crate::geom::Pose;
 use crate::model::inverse::{
@@ -110,6 +110,20 @@ const fn is_angle(kind: JointKind) -> bool {
 fn misread(way: ReadAs, poses: &ControllerPoses, place: String, fit: &str) -> Option<Error> {
     let in_unit = |unit: &LengthUnit| format!("positions are in {}", unit.name);
     let to_metres = |unit: &LengthUnit| format!("multiply x_m, y_m and z_m by {}", unit.metres);
+    match way.misplaced {
+        Some(Misplaced::Columns(a, b)) => {
+            let [a, b] = [a, b].map(|axis| ["x_m", "y_m", "z_m"][axis]);
+            let what = format!("{a} and {b} stand in each other's column: exchanged {fit}");
+            return Some(Error::new(Code::AxesMirrored, place, what, format!("exchange the columns {a} and {b}")));
+        }
+        Some(Misplaced::Rows { below }) => {
+            let other = if below { "below" } else { "above" };
+            let what = format!("the poses are shifted by one row: with the pose of the row {other} {fit}");
+            let remedy = "shift the names in the first column of controller.csv by one row";
+            return Some(Error::new(Code::RowsShifted, place, what, remedy));
+        }
+        None => (),
+    }
     Some(match (way.otherwise.map(|k| &poses.otherwise[k]), way.unit) {
         (None, None) => return None,
         (Some(other), None) => Error::new(other.code, place, other.says(fit), &other.remedy),
@@ -328,7 +342,7 @@ impl Arm {
                 Told::Fit(_) =>
                     ". What was seen at the stops fits the poses as they are: they are not inverted, rotation and unit are as stated",
                 Told::InNoWay =>
-                    ". What was seen at the stops does not fit them either, nor inverted, in another unit or convention",
+                    ". What was seen at the stops does not fit them either, nor inverted, in another unit, convention, column or row",
                 Told::Open => "",
             }
         );

@@ -1,7 +1,8 @@
 //! How poses of a controller are to be read, by what was seen at them.
 //!
 //! A tool on the flange and a frame in the base are constant: hand-eye transform and target pose take them up, and what was seen fits the poses as
-//! they are written, whether or not the robot reaches them. No constant makes up for another convention of rotation, inverted poses or another unit.
+//! they are written, whether or not the robot reaches them. No constant makes up for another convention of rotation, inverted poses,
+//! another unit, or numbers in the wrong column or row.
 
 use std::collections::BTreeMap;
 
@@ -24,24 +25,56 @@ pub(in crate::identify) struct ReadAs {
     pub otherwise: Option<usize>,
     /// The unit of the positions, where it is not metres.
     pub unit: Option<LengthUnit>,
+    /// Where the numbers stand, where it is not where they should.
+    pub misplaced: Option<Misplaced>,
+}
+
+/// Numbers of a table of poses that stand in the wrong column or row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::identify) enum Misplaced {
+    /// Two coordinates of the position stand in each other's column.
+    Columns(usize, usize),
+    /// Every pose stands one row off: that of a stop in the row below, or above.
+    Rows {
+        /// True for the row below.
+        below: bool,
+    },
 }
 
 impl ReadAs {
     /// As they are written.
-    pub const WRITTEN: Self = Self { otherwise: None, unit: None };
+    pub const WRITTEN: Self = Self { otherwise: None, unit: None, misplaced: None };
 
     /// All ways with one mistake undone, and all with two.
     pub fn mistaken(poses: &ControllerPoses) -> [Vec<Self>; 2] {
-        let others = || (0..poses.otherwise.len()).map(|k| Self { otherwise: Some(k), unit: None });
+        let others = || (0..poses.otherwise.len()).map(|k| Self { otherwise: Some(k), ..Self::WRITTEN });
         let in_units = |way: Self| LENGTH_UNITS.iter().map(move |unit| Self { unit: Some(*unit), ..way });
         [in_units(Self::WRITTEN).chain(others()).collect(), others().flat_map(in_units).collect()]
+    }
+
+    /// All ways with numbers in the wrong place. Whether poses are reached tells nothing of them: every one is, or its neighbour.
+    fn misplaced() -> impl Iterator<Item = Self> {
+        let columns = [(0, 1), (0, 2), (1, 2)].map(|(a, b)| Misplaced::Columns(a, b));
+        let rows = [true, false].map(|below| Misplaced::Rows { below });
+        columns.into_iter().chain(rows).map(|misplaced| Self { misplaced: Some(misplaced), ..Self::WRITTEN })
     }
 
     /// The poses, read so.
     pub fn of(self, poses: &ControllerPoses) -> Vec<Option<Pose>> {
         let read = self.otherwise.map_or(&poses.base_from_flange, |k| &poses.otherwise[k].poses);
         let metres = self.unit.map_or(1.0, |unit| unit.metres);
-        read.iter().map(|pose| pose.map(|p| Pose::new(p.rotation, p.translation * metres))).collect()
+        let in_metres = |pose: &Pose| Pose::new(pose.rotation, pose.translation * metres);
+        let of = |row: Option<usize>| read.get(row?)?.as_ref().map(in_metres);
+        let at = |row: usize| match self.misplaced {
+            None => of(Some(row)),
+            Some(Misplaced::Columns(a, b)) => of(Some(row)).map(|mut pose| {
+                pose.translation.swap_rows(a, b);
+                pose
+            }),
+            Some(Misplaced::Rows { below: true }) => of(Some(row + 1)),
+            Some(Misplaced::Rows { below: false }) => of(row.checked_sub(1)),
+        };
+        (0..read.len()).map(at).collect()
     }
 }
 
@@ -125,5 +158,7 @@ pub(in crate::identify) fn told(series: &MeasuredSeries, poses: &ControllerPoses
         let tried = ways.into_iter().map(|way| (misfit(way), way));
         tried.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(left, _)| explains(*left))
     };
-    ReadAs::mistaken(poses).into_iter().find_map(best_of).map_or(Told::InNoWay, |(_, way)| Told::Fit(way))
+    let [mut of_one, of_two] = ReadAs::mistaken(poses);
+    of_one.extend(ReadAs::misplaced());
+    [of_one, of_two].into_iter().find_map(best_of).map_or(Told::InNoWay, |(_, way)| Told::Fit(way))
 }
