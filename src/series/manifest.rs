@@ -9,7 +9,7 @@ use super::inputs::{InputFile, read_text};
 use super::sections::{
     ContactSection, ControllerSection, DistanceSection, PlateMountSection, SecondRobotSection, TrackerSection,
 };
-use super::toml_file::{check_format, parse_toml, require_positive, require_sigma_m, to_toml};
+use super::toml_file::{check_format, parse_toml, require_positive, require_sigma_m, require_sigma_rad, to_toml};
 use crate::error::{Code, Error, Result};
 use crate::files::FileKind;
 
@@ -217,7 +217,7 @@ impl Manifest {
     fn check_measured(&self, path: &Path) -> Result<()> {
         let tracker = self.tracker.as_ref();
         require_sigma_m(path, "tracker.sigma_m", tracker.and_then(|t| t.sigma_m))?;
-        require_positive(path, "tracker.sigma_rad", tracker.and_then(|t| t.sigma_rad))?;
+        require_sigma_rad(path, "tracker.sigma_rad", tracker.and_then(|t| t.sigma_rad))?;
         require_sigma_m(path, "contact.sigma_m", self.contact.as_ref().and_then(|c| c.sigma_m))?;
         self.distance.iter().try_for_each(|d| d.check(path))
     }

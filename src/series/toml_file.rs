@@ -24,12 +24,27 @@ pub(super) const LARGEST_SIGMA_M: f64 = 0.01;
 /// What to do about such a number.
 pub(super) const SIGMA_IN_METRES: &str = "write it in metres: 0.00005 for 0.05 mm";
 
+/// A rotation is measured to less, rad: a larger number is one in degrees.
+const LARGEST_SIGMA_RAD: f64 = 0.05;
+
 /// Refuses the standard deviation of a coordinate that is not positive, or not in metres.
 pub(super) fn require_sigma_m(path: &Path, key: &str, value: Option<f64>) -> Result<()> {
     require_positive(path, key, value)?;
     match value {
         Some(v) if v >= LARGEST_SIGMA_M => {
             Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), SIGMA_IN_METRES))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses the standard deviation of a rotation that is not positive, or not in rad.
+pub(super) fn require_sigma_rad(path: &Path, key: &str, value: Option<f64>) -> Result<()> {
+    require_positive(path, key, value)?;
+    match value {
+        Some(v) if v >= LARGEST_SIGMA_RAD => {
+            let remedy = "write it in rad: 0.0001 for 0.0057 deg";
+            Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), remedy))
         }
         _ => Ok(()),
     }

@@ -326,8 +326,14 @@ fn mistakes_in_the_file_of_a_tracker_are_named() {
             (&|pose| pose.translation /= 0.3048, Code::MeasuredUnit),
             (&|pose| pose.translation.x *= -1.0, Code::AxesMirrored),
         ];
-        let of_poses: [Misread; 4] = [
+        let other_angles = |pose: &mut Pose| {
+            let [roll, pitch, yaw] = pose.rpy();
+            *pose = Pose::from_xyz_rpy(pose.xyz(), [yaw, pitch, roll]);
+        };
+        let of_poses: [Misread; 6] = [
             (&mirrored, Code::AxesMirrored),
+            (&|pose| pose.translation.swap_rows(0, 1), Code::AxesMirrored),
+            (&other_angles, Code::RotationConvention),
             (&|pose| pose.rotation = pose.rotation.transpose(), Code::PosesInverted),
             (&|pose| *pose = pose.inverse(), Code::PosesInverted),
             (&scalar_first, Code::RotationConvention),

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::misfit::{FEWEST_POSES, SeenAt};
 use super::points_start::FEWEST_POINTS;
-use super::rows_of::rows_of_bodies;
+use super::rows_of::{rows_of_bodies, table};
 use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, MistakeKind};
 use crate::error::Result;
@@ -87,7 +87,12 @@ pub(super) fn mistake(
     let explaining: Vec<Explained> = tried.filter(explains).collect();
     let (named, kind) = likeliest(&explaining, robot, limits)?;
     let left = explaining[named].0 * shrinks(&explaining[named].1);
-    let of = instrument.place();
+    let of = match kind {
+        MistakeKind::Poses { .. } | MistakeKind::MeasuredUnit(_) => {
+            format!("{}, {}", table(problem, &problem.body_measurements[measured[0]]), instrument.place())
+        }
+        _ => instrument.place(),
+    };
     let rows_of = rows_of_bodies(adjustment, measured, limits);
     Some(Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of })
 }

@@ -87,7 +87,8 @@ fn bodies_fit(
     })
 }
 
-fn table(problem: &Problem, measured: &BodyMeasurement) -> &'static str {
+/// The table that a measurement stands in.
+pub(super) fn table(problem: &Problem, measured: &BodyMeasurement) -> &'static str {
     match (problem.instruments[measured.instrument].kind, measured.seen) {
         (InstrumentKind::Tracker, BodySeen::Point(_)) => "points.csv",
         (InstrumentKind::Tracker, BodySeen::Pose(_)) => "poses.csv",
