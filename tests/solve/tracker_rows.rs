@@ -8,7 +8,7 @@ use robotcal::diagnose::{Carried, Displaced, Finding, Subject, Weight};
 use robotcal::error::Code;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
-use robotcal::problem::{BodySeen, InstrumentKind, MeasuredSeries, SeenBody};
+use robotcal::problem::{BodySeen, InstrumentKind, MeasuredSeries};
 
 use crate::measured_worlds::{Kind, World, chain, readings, stop, truth};
 use crate::support::small::Dice;

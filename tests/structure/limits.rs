@@ -71,6 +71,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("diagnose/left_out/moved.rs CHANGES", "which of two causes is told of what fails either way"),
     ("diagnose/left_out/exchanged_pictures.rs MOST_IMAGES", "how many are named"),
     ("diagnose/left_out/exchanged_readings.rs MOST_STOPS", "how many are named"),
+    ("diagnose/steps/place_misstated.rs MOST_STOPS", "how many are named"),
     ("diagnose/steps/displaced.rs MOST_IMAGES", "how many are named"),
     ("diagnose/held_parameters.rs MOST_NAMED", "how many are named"),
     ("diagnose/joint_noise.rs MOST_IMAGES", "how many are named"),

@@ -86,11 +86,7 @@ impl Displaced {
 
     /// True where a tracker or contacts show it, not images.
     pub(in crate::diagnose) fn is_measured(&self) -> bool {
-        match self.body {
-            Carried::Plate | Carried::PlateInHand | Carried::CameraInHand | Carried::Camera => false,
-            Carried::Instrument | Carried::Places | Carried::Socket => true,
-            Carried::Target | Carried::Bracket | Carried::Fixture => true,
-        }
+        !matches!(self.body, Carried::Plate | Carried::PlateInHand | Carried::CameraInHand | Carried::Camera)
     }
 
     /// The first image in which it stands elsewhere.
@@ -110,6 +106,26 @@ impl Displaced {
             Carried::Target => "target on the tip",
             Carried::Bracket => "bracket of all targets on the tip",
             Carried::Fixture => "fixture of all sockets",
+        }
+    }
+
+    /// Where it is elsewhere in one of several series.
+    fn remedy_between_series(&self) -> String {
+        match self.body {
+            Carried::Camera | Carried::CameraInHand => {
+                format!("write another mounting under [camera] in the series.toml of {}", self.series)
+            }
+            Carried::Plate | Carried::PlateInHand => {
+                format!("write a placement of its own into the joints.csv of {}", self.series)
+            }
+            Carried::Instrument => {
+                format!("write another name under [tracker] in the series.toml of {}", self.series)
+            }
+            Carried::Places => format!("write another frame under [contact] in the series.toml of {}", self.series),
+            Carried::Socket => format!("give contact {} another name in {}", self.places.join(", "), self.series),
+            Carried::Target => format!("give the target another name in {}", self.series),
+            Carried::Bracket => format!("give all targets other names in {}", self.series),
+            Carried::Fixture => format!("give all contacts other names in {}", self.series),
         }
     }
 }
@@ -172,9 +188,8 @@ impl Kind for Displaced {
         let what = match self.displacement {
             Displacement::FromThenOn => {
                 let stands = match self.body {
-                    Carried::Plate | Carried::Camera | Carried::Instrument => "stands",
-                    Carried::Places | Carried::Socket | Carried::Fixture => "stands",
                     Carried::PlateInHand | Carried::CameraInHand | Carried::Target | Carried::Bracket => "sits",
+                    _ => "stands",
                 };
                 let touched = match self.body {
                     Carried::Camera | Carried::CameraInHand => ", creeps, or its lens was touched".to_owned(),
@@ -249,22 +264,7 @@ impl Kind for Displaced {
                     )
                 }
             },
-            Displacement::InAll => match self.body {
-                Carried::Camera | Carried::CameraInHand => {
-                    format!("write another mounting under [camera] in the series.toml of {}", self.series)
-                }
-                Carried::Plate | Carried::PlateInHand => {
-                    format!("write a placement of its own into the joints.csv of {}", self.series)
-                }
-                Carried::Instrument => {
-                    format!("write another name under [tracker] in the series.toml of {}", self.series)
-                }
-                Carried::Places => format!("write another frame under [contact] in the series.toml of {}", self.series),
-                Carried::Socket => format!("give contact {} another name in {}", self.places.join(", "), self.series),
-                Carried::Target => format!("give the target another name in {}", self.series),
-                Carried::Bracket => format!("give all targets other names in {}", self.series),
-                Carried::Fixture => format!("give all contacts other names in {}", self.series),
-            },
+            Displacement::InAll => self.remedy_between_series(),
             Displacement::ByTurns => {
                 "give the rows of each place a placement of their own in joints.csv, or fasten it and take the series again".into()
             }

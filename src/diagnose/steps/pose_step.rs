@@ -131,15 +131,13 @@ impl Squares {
         let group = step.group;
         let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
         let of_poses = share(self.poses[group], after.poses[group]);
-        let of_bodies = || {
-            let parts = self.bodies.iter().zip(&after.bodies);
-            parts.map(|(before, after)| share(before[group], after[group])).fold(0.0, f64::max)
-        };
         let of_part = match step.changed {
-            Changed::Instrument(_) | Changed::Place { .. } => of_bodies(),
-            Changed::Target(_) | Changed::Bracket | Changed::Fixture => of_bodies(),
+            Changed::Placement(_) | Changed::Mounting(_) | Changed::Focal(_) | Changed::Centre(_) => 0.0,
             Changed::Zero(reading) => share(self.zeros[group][reading], after.zeros[group][reading]),
-            _ => 0.0,
+            _ => {
+                let parts = self.bodies.iter().zip(&after.bodies);
+                parts.map(|(before, after)| share(before[group], after[group])).fold(0.0, f64::max)
+            }
         };
         of_poses.max(of_part)
     }
@@ -185,10 +183,8 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     let matters = distance_m.0 > limits.displaced_m || angle_rad.is_some_and(|angle| angle.0 > limits.displaced_rad);
     let weight = weight(matters);
     let (body, mounting) = carried(step.changed, first, problem)?;
-    let sockets: BTreeSet<usize> = step.shown.iter().filter_map(|shown| shown.socket(problem)).collect();
-    let named = |socket: usize| problem.instruments[socket].name.clone();
     let is_of_sockets = matches!(body, Carried::Fixture | Carried::Socket);
-    let places = sockets.into_iter().filter(|_| is_of_sockets).map(named).collect();
+    let places = if is_of_sockets { sockets(step, problem) } else { Vec::new() };
     Some(
         Displaced {
             series,
@@ -205,6 +201,12 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
         }
         .into(),
     )
+}
+
+/// Names of the sockets that it moves.
+fn sockets(step: &Step, problem: &Problem) -> Vec<String> {
+    let all: BTreeSet<usize> = step.shown.iter().filter_map(|shown| shown.socket(problem)).collect();
+    all.into_iter().map(|socket| problem.instruments[socket].name.clone()).collect()
 }
 
 /// Said where the images by themselves do not say so.

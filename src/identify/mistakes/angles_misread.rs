@@ -50,7 +50,7 @@ impl Order {
 
 /// Angles of one order that were taken for those of another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct AnglesMisread {
+pub(in crate::identify) struct AnglesMisread {
     taken: Order,
     meant: Order,
 }
@@ -58,7 +58,8 @@ pub(super) struct AnglesMisread {
 impl AnglesMisread {
     /// All of them.
     pub(super) fn all() -> impl Iterator<Item = Self> {
-        let of = |taken| Order::ALL.into_iter().filter(move |meant| *meant != taken).map(move |meant| (taken, meant));
+        let of =
+            |taken: Order| Order::ALL.into_iter().filter(move |meant| *meant != taken).map(move |meant| (taken, meant));
         Order::ALL.into_iter().flat_map(of).map(|(taken, meant)| Self { taken, meant })
     }
 

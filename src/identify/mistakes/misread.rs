@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::angles_misread::AnglesMisread;
 use crate::diagnose::MistakeKind;
 use crate::error::Code;
 use crate::geom::Pose;
-use crate::identify::mistakes::angles_misread::AnglesMisread;
 use crate::problem::BodySeen;
 use crate::series::{LENGTH_UNITS, LengthUnit};
 
