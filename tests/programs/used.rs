@@ -15,7 +15,11 @@ fn positions_that_are_frames_or_offsets_of_others_stay_as_they_are() {
     let unvisited = LeftReason::Unvisited;
     for (body, left, is_rewritten) in [
         ("$BASE=XFRAME\n", vec![], false),
-        ("LIN XP1 WITH $BASE=XFRAME, $TOOL=$NULLFRAME\n", vec![LeftReason::FramesDiffer, LeftReason::OutOfReach], false),
+        (
+            "LIN XP1 WITH $BASE=XFRAME, $TOOL=$NULLFRAME\n",
+            vec![LeftReason::FramesDiffer, LeftReason::OutOfReach],
+            false,
+        ),
         ("LIN XP1:XFRAME\n", vec![LeftReason::Computed, unvisited], false),
         ("XOTHER=XP1:XFRAME\n", vec![unvisited], false),
         ("LIN XFRAME\n$BASE=XFRAME\n", vec![LeftReason::FramesDiffer], false),

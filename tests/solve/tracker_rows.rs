@@ -1,6 +1,5 @@
 //! Rows of a tracker that are not of their stops: shifted in part, written again, of another session, or left out at the start though they are
-//! right; sockets that were moved; and known places
-//! that are misstated.
+//! right; sockets that were moved; and known places that are misstated.
 
 use nalgebra::Vector3;
 use robotcal::Error;
@@ -187,8 +186,10 @@ fn by_turns(seed: u64, sockets: usize, moved: &[usize], from: usize, shift: Vect
 }
 
 fn displaced(solution: &Solution) -> Vec<&Displaced> {
-    let of = |finding| if let &Finding::Displaced(ref displaced) = finding { Some(displaced) } else { None };
-    solution.findings.iter().filter_map(of).collect()
+    let found = solution.findings.iter();
+    found
+        .filter_map(|finding| if let Finding::Displaced(displaced) = finding { Some(displaced) } else { None })
+        .collect()
 }
 
 #[test]
@@ -250,8 +251,9 @@ fn a_known_place_that_is_misstated_is_named_and_no_tracker() {
         let world = known_places(seed, |name, place| if name == "socket 3" { place + off } else { place });
         let solution = world.solve(RobotModel::Rigid);
         assert!(displaced(&solution).is_empty(), "seed {seed}: {:?}", solution.findings);
-        let of = |finding| if let &Finding::PlaceMisstated(ref place) = finding { Some(place) } else { None };
-        let said: Vec<_> = solution.findings.iter().filter_map(of).collect();
+        let found = solution.findings.iter();
+        let said: Vec<_> =
+            found.filter_map(|f| if let Finding::PlaceMisstated(place) = f { Some(place) } else { None }).collect();
         if off == Vector3::zeros() {
             assert!(said.is_empty(), "{said:?}");
             continue;
