@@ -236,7 +236,7 @@ fn images_that_fit_the_robot_found_are_not_left_out_for_missing_the_nominal_one(
     let solution = identify(chain, &[series], &Options::default()).unwrap();
     let left_out: Vec<_> = solution.fit.problem.images.iter().filter_map(|i| i.rejected.as_ref()).collect();
     assert!(left_out.is_empty(), "{left_out:?}");
-    let off = |f: &Finding| matches!(f, Finding::ParameterOff(p) if p.parameter == "robot/joint_a2.offset");
+    let off = |f: &Finding| matches!(f, Finding::ZeroOff(zero) if zero.joint == "joint_a2");
     assert!(solution.findings.iter().any(off), "{:?}", solution.findings);
 }
 

@@ -196,9 +196,7 @@ fn closed_form(
         });
     }
     let suspects = Suspects { problem, robot: &state.robot, series, pairs, groups, limits };
-    // The least that any form leaves, as where other zeros are looked for: it is not always that of the best in pixels.
-    let least = starts.first().map_or(best.median_error, |s| s.median_error);
-    check_fit(&suspects, least, of, "even at the best start")?;
+    check_fit(&suspects, best.median_error, of, "even at the best start")?;
     Ok(best.solution)
 }
 
