@@ -66,7 +66,7 @@ pub(super) fn figures(plate: &Plate, caption: &Caption) -> Vec<Figure> {
 fn advice(sheet: &Sheet, tens: u32) -> String {
     let size = format!("{:.0} x {:.0} mm", sheet.width_m * 1e3, sheet.height_m * 1e3);
     let paper = sheet.paper.map_or(size.clone(), |p| format!("{p} ({size})"));
-    format!("Print on {paper}: the bar must be {} mm.", tens * 10)
+    format!("Print on {paper}, the bar must be {} mm.", tens * 10)
 }
 
 /// The printed field itself.
@@ -135,11 +135,11 @@ fn scale_bar(y: f64, tens: u32, all: &mut Vec<Figure>) {
     }
 }
 
-/// A line of text on a line that joins its letters, as far as the sheet reaches.
+/// A line of text on a line that joins its letters, as far as the sheet reaches: a dash, which does not reach down to it, is left out.
 fn ruled_text(at: [f64; 2], half_width: f64, line: &str, all: &mut Vec<Figure>) {
     let half = (HALF_LETTER * line.len() as f64).min(half_width - 0.004);
     all.push(Figure::Line { from: [at[0] - half, at[1]], to: [at[0] + half, at[1]], width: RULE });
-    text(at, line, all);
+    text(at, &line.replace('-', " "), all);
 }
 
 fn text(at: [f64; 2], text: &str, all: &mut Vec<Figure>) {
