@@ -392,7 +392,7 @@ codes! {
         TouchedFromBelow "touched_from_below" "the tool came from below the plane of the touched places",
         WorkCarried "work_carried" "a work object is stated in a link that the joints of the robot move",
         WorkNotCarried "work_not_carried" "touched places do not go with the base of the solution, which joints of the robot move",
-        WorkDisplaced "work_displaced" "the work object, a socket, or the fixture of all sockets or given places, stands elsewhere from some touch on",
+        WorkDisplaced "work_displaced" "the work object, a socket, or the fixture of all sockets or given places, stands elsewhere from some touch on, or in one of several series",
         FramesUnknown "frames_unknown" "base and tool of the real robot are known worse than the correction is large",
         FramesNominal "frames_nominal" "base and tool were taken as nominal, as asked for",
     }

@@ -7,6 +7,7 @@
 //! With measured tools `T` and work objects `W` of both robots, `W_B^-1 B(q') T_B = W_A^-1 A(q) T_A`: the tool comes to the same place of the work object.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use nalgebra::Vector6;
 
@@ -122,9 +123,12 @@ impl Compensated {
     pub fn tell_what_moves(&self, program: &mut Program) {
         let done = || program.targets.iter().zip(&self.outcomes).filter(|(_, o)| matches!(o, TargetOutcome::Done(_)));
         let corrected = |point: &&DeclaredPoint| done().any(|(t, _)| (t.file, t.line) == (point.file, point.line));
-        for Left { why, .. } in &mut program.left {
-            // One that is used with a known tool and work object as well.
-            let itself = why.about.iter().filter(|name| done().any(|(t, _)| t.visited && t.name == **name));
+        let module = |file: usize| Path::new(&program.files[file].name).with_extension("");
+        for Left { file, why, .. } in &mut program.left {
+            // One of this module that is used with a known tool and work object as well: others may have a point of the same name.
+            let is_own = |t: &Target| module(t.file) == module(*file);
+            let itself =
+                why.about.iter().filter(|name| done().any(|(t, _)| t.visited && t.name == **name && is_own(t)));
             let points = why.starts_from.iter().filter(corrected).map(|point| &point.name);
             let names: BTreeSet<&str> = itself.chain(points).map(String::as_str).collect();
             if !names.is_empty() {

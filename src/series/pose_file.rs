@@ -2,7 +2,7 @@
 
 use super::quaternion::{are_zeros, quaternion};
 use super::stop_index::{
-    StopIndex, position, position_columns, refuse_twice, sigma, sigma_of_place, stop_column, target_name,
+    StopIndex, position, position_columns, refuse_twice, sigma_of_place, sigma_of_rotation, stop_column, target_name,
 };
 use super::table::Table;
 use crate::error::Result;
@@ -57,7 +57,7 @@ pub(super) fn rows(table: &Table, stops: &StopIndex<'_>) -> Result<(Vec<PoseRow>
             target: name,
             tracker_from_target: Pose::new(quaternion(table, row, xyzw, row.cell(stop))?, place),
             sigma_m: sigma_of_place(table, row, sigma_m)?,
-            sigma_rad: sigma(table, row, sigma_rad)?,
+            sigma_rad: sigma_of_rotation(table, row, sigma_rad)?,
             line: row.line,
         });
     }

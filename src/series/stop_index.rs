@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::joints::{StopKey, Stops};
 use super::table::{Row, Table};
-use super::toml_file::{LARGEST_SIGMA_M, SIGMA_IN_METRES};
+use super::toml_file::{LARGEST_SIGMA_M, LARGEST_SIGMA_RAD, SIGMA_IN_METRES, SIGMA_IN_RAD};
 use crate::error::{Code, Error, Result, closest_name};
 
 /// The stops of a series by name.
@@ -86,10 +86,24 @@ pub(super) fn sigma(table: &Table, row: Row<'_>, column: Option<usize>) -> Resul
 
 /// The same of a coordinate, m.
 pub(super) fn sigma_of_place(table: &Table, row: Row<'_>, column: Option<usize>) -> Result<Option<f64>> {
+    sigma_below(table, row, column, (LARGEST_SIGMA_M, SIGMA_IN_METRES))
+}
+
+/// The same of a rotation, rad.
+pub(super) fn sigma_of_rotation(table: &Table, row: Row<'_>, column: Option<usize>) -> Result<Option<f64>> {
+    sigma_below(table, row, column, (LARGEST_SIGMA_RAD, SIGMA_IN_RAD))
+}
+
+fn sigma_below(
+    table: &Table,
+    row: Row<'_>,
+    column: Option<usize>,
+    (largest, remedy): (f64, &str),
+) -> Result<Option<f64>> {
     let value = sigma(table, row, column)?;
     match (column, value) {
-        (Some(c), Some(v)) if v >= LARGEST_SIGMA_M => {
-            Err(table.refuse(Code::CsvRange, row, c, "is larger than of any measurement", SIGMA_IN_METRES))
+        (Some(c), Some(v)) if v >= largest => {
+            Err(table.refuse(Code::CsvRange, row, c, "is larger than of any measurement", remedy))
         }
         _ => Ok(value),
     }

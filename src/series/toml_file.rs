@@ -25,7 +25,9 @@ pub(super) const LARGEST_SIGMA_M: f64 = 0.01;
 pub(super) const SIGMA_IN_METRES: &str = "write it in metres: 0.00005 for 0.05 mm";
 
 /// A rotation is measured to less, rad: a larger number is one in degrees.
-const LARGEST_SIGMA_RAD: f64 = 0.05;
+pub(super) const LARGEST_SIGMA_RAD: f64 = 0.05;
+/// What to do about such a number.
+pub(super) const SIGMA_IN_RAD: &str = "write it in rad: 0.0001 for 0.0057 deg";
 
 /// Refuses the standard deviation of a coordinate that is not positive, or not in metres.
 pub(super) fn require_sigma_m(path: &Path, key: &str, value: Option<f64>) -> Result<()> {
@@ -43,8 +45,7 @@ pub(super) fn require_sigma_rad(path: &Path, key: &str, value: Option<f64>) -> R
     require_positive(path, key, value)?;
     match value {
         Some(v) if v >= LARGEST_SIGMA_RAD => {
-            let remedy = "write it in rad: 0.0001 for 0.0057 deg";
-            Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), remedy))
+            Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), SIGMA_IN_RAD))
         }
         _ => Ok(()),
     }

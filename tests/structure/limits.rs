@@ -86,6 +86,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("diagnose/slopes.rs TOLD_APART", "rounding"),
     ("diagnose/steps/rows.rs LEFT", "rounding"),
     ("diagnose/steps/candidates.rs MOST_TRIED", "how many are tried at first"),
+    ("diagnose/steps/orders.rs SAME_PLACE_M", "which places are one, or in a line"),
     ("frames/absorbed.rs HELD", "rounding"),
     ("frames/absorbed.rs MOST", "samples of an average"),
     ("frames/fit.rs ROUNDS", "most iterations"),

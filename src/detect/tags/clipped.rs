@@ -4,7 +4,7 @@
 //! of pixels moves by more or less than that, by where it lies between the centres of two rows. Over all places the standard deviation is
 //!
 //! ```text
-//! sigma = 0.04 px^2 |g| / s^2
+//! sigma = 0.045 px^2 |g| / s^2
 //! ```
 //!
 //! by sums over the pixels of min(full scale, light), for edges of a Gaussian of 0.2 to 1.2 px seen by square pixels, `s` with the area of the pixel,

@@ -34,6 +34,14 @@ pub enum Changed {
 }
 
 impl Changed {
+    /// Directions of it that have to be told: where a place is, is said along all axes.
+    pub(super) const fn least_told(self) -> usize {
+        match self {
+            Self::Place { .. } => 3,
+            _ => 1,
+        }
+    }
+
     pub(super) fn columns(self, layout: &Layout, zeros: &[Option<usize>]) -> Range<usize> {
         let told = |range: &Range<usize>| {
             let count = range.clone().take_while(|c| layout.columns[*c].free).count();

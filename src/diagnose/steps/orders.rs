@@ -3,10 +3,32 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
+use nalgebra::Vector3;
+
 use super::candidates::{Candidate, Changed, Order, Shown, is_socket, stride};
 use super::rows::{Chances, Linear, Step};
 use crate::problem::{InstrumentKind, Problem};
 use crate::series::CameraMount;
+
+/// Places closer than this to each other, or to a line, m, count as one, or as on it.
+const SAME_PLACE_M: f64 = 1e-3;
+
+/// Whether one place that is wrong can be told from another: without any two of them, three that are in no line hold their frame. With fewer, a shift
+/// of another and a turn of the frame explain the same.
+fn tell_which(touched: &[Vector3<f64>]) -> bool {
+    let mut places: Vec<Vector3<f64>> = Vec::new();
+    for place in touched {
+        if places.iter().all(|other| (other - place).norm() > SAME_PLACE_M) {
+            places.push(*place);
+        }
+    }
+    let on_line = |a: usize, b: usize| {
+        let along = (places[b] - places[a]).normalize();
+        places.iter().filter(|p| (*p - places[a]).cross(&along).norm() <= SAME_PLACE_M).count()
+    };
+    let pairs = (0..places.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+    places.len() > 4 && pairs.map(|(a, b)| on_line(a, b)).all(|on| on + 2 < places.len())
+}
 
 impl Linear {
     /// Ways to divide the stops, with at least so many of them on either side.
@@ -33,6 +55,12 @@ impl Linear {
                 all.push(Candidate { changed, order: Order::Whole, group, rows: Rc::new(rows), from: 0, fewest: 0 });
             }
         }
+        let place = |first: usize| problem.body_measurements[first].seen.position();
+        let of = |instrument: usize| {
+            let own = problem.used_bodies().filter(move |(_, measured)| measured.instrument == instrument);
+            own.map(|(k, _)| place(k)).collect::<Vec<_>>()
+        };
+        all.retain(|c| matches!(c.changed, Changed::Place { instrument, .. } if tell_which(&of(instrument))));
         all
     }
 
@@ -187,5 +215,21 @@ impl Linear {
             Some(Shown::Image { up, .. }) => up[axis],
             _ => 0.0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_place_is_told_among_five_of_which_any_three_span_a_plane() {
+        let at = |x: f64, y: f64| Vector3::new(x, y, 0.0);
+        let square = [at(0.0, 0.0), at(0.2, 0.0), at(0.0, 0.2), at(0.2, 0.2)];
+        assert!(!tell_which(&[square, square].concat()));
+        assert!(tell_which(&[&square[..], &[at(0.1, 0.07)]].concat()));
+        let in_line = [at(0.0, 0.0), at(0.1, 0.0), at(0.2, 0.0), at(0.0, 0.2), at(0.2, 0.2)];
+        assert!(!tell_which(&in_line));
+        assert!(tell_which(&[&in_line[..], &[at(0.1, 0.15)]].concat()));
     }
 }

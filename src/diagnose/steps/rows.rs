@@ -402,7 +402,7 @@ impl Linear {
                 candidate.moved().for_each(|(r, part)| add(&mut sums, r, part));
             }
             before = Some(candidate);
-            let Some(fall) = sums.fall(covariance).filter(|fall| fall.told > 0) else { continue };
+            let Some(fall) = sums.fall(covariance).filter(|fall| fall.told >= changed.least_told()) else { continue };
             let score = score(&fall);
             if best.as_ref().is_none_or(|(_, least, _)| score < *least) {
                 best = Some((candidate, score, fall));

@@ -66,7 +66,7 @@ pub(super) fn figures(plate: &Plate, caption: &Caption) -> Vec<Figure> {
 fn advice(sheet: &Sheet, tens: u32) -> String {
     let size = format!("{:.0} x {:.0} mm", sheet.width_m * 1e3, sheet.height_m * 1e3);
     let paper = sheet.paper.map_or(size.clone(), |p| format!("{p} ({size})"));
-    format!("Print on {paper}, the bar must be {} mm.", tens * 10)
+    format!("Print in full size on {paper}, the bar must be {} mm.", tens * 10)
 }
 
 /// The printed field itself.

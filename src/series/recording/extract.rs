@@ -112,7 +112,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         reports,
         image_delay_s: lateness.image_delay_s,
         late,
-        camera_info: scan.camera_info(&image_topic, image_frame.as_deref()).cloned(),
+        camera_info: scan.camera_info(&image_topic, image_frame.as_deref(), options.image_frame.is_some()).cloned(),
         joint_topic: topics.join(", "),
         image_topic,
         notices,

@@ -76,9 +76,9 @@ impl Infos {
         Ok(())
     }
 
-    /// That of a frame, or the only one.
-    pub fn of(&self, frame: Option<&str>) -> Option<&CameraInfo> {
-        let only = || if self.0.len() == 1 { self.0.values().next() } else { None };
+    /// That of a frame, or the only one where nobody asked for the frame: it may be that of another camera.
+    pub fn of(&self, frame: Option<&str>, is_asked_for: bool) -> Option<&CameraInfo> {
+        let only = || if self.0.len() == 1 && !is_asked_for { self.0.values().next() } else { None };
         frame.and_then(|frame| self.0.get(frame)).or_else(only)
     }
 }

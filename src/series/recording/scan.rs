@@ -431,14 +431,14 @@ impl Scan {
     }
 
     /// The camera info beside an image topic, or the only one: that of the frame of the images where it is of several.
-    pub fn camera_info(&self, image_topic: &str, frame: Option<&str>) -> Option<&CameraInfo> {
+    pub fn camera_info(&self, image_topic: &str, frame: Option<&str>, is_asked_for: bool) -> Option<&CameraInfo> {
         let base = image_topic.strip_suffix("/compressed").unwrap_or(image_topic);
         let beside = base.rsplit_once('/').map(|(namespace, _)| format!("{namespace}/camera_info"));
         let infos = match beside.and_then(|topic| self.infos.get(&topic)) {
             None if self.infos.len() == 1 => self.infos.values().next(),
             infos => infos,
         };
-        infos?.of(frame)
+        infos?.of(frame, is_asked_for)
     }
 
     /// Median time from stamp to recording over some topics, s.
