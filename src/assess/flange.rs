@@ -16,7 +16,7 @@ use super::statistics::extent;
 use super::stops::{halton_stops, range_of};
 use super::used_stops::{still, stops};
 use crate::geom::{Pose, adjoint};
-use crate::linalg::{SymmetricFactor, median};
+use crate::linalg::SymmetricFactor;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Adjustment, Layout};
 use crate::solve::Spread;
@@ -134,27 +134,16 @@ impl<'a> FlangeModel<'a> {
         self.layout.mountings.iter().any(|r| r.start == self.still_column)
     }
 
-    /// The same relative to the base that fits the stops best, where nothing that stands still remains.
-    pub(super) fn with_fitted_base(self, stops: &[Posture]) -> Option<Self> {
-        self.taking_up(stops, 6)
-    }
-
-    /// The same with the base and the tool that fit the positions of the flange at samples best: what is not known of these is no error then.
-    /// Positions do not tell how the flange is turned, so that only they are stated by it.
-    pub fn laid_over(self, samples: &[Posture]) -> Option<Self> {
-        self.taking_up(samples, 3)
-    }
-
-    /// Least squares over tool and base, `J(q) = tool + Ad(pose(q)^-1) base`, in the first `rows` of the body twist.
-    fn taking_up(mut self, samples: &[Posture], rows: usize) -> Option<Self> {
+    /// The same relative to the base that fits the stops best, where nothing that stands still remains: least squares over
+    /// tool and base, `J(q) = tool + Ad(pose(q)^-1) base`.
+    pub(super) fn with_fitted_base(mut self, stops: &[Posture]) -> Option<Self> {
         let columns = self.layout.theta_len();
         let (mut n, mut rhs) = (DMatrix::zeros(12, 12), DMatrix::zeros(12, columns));
-        for (pose, j) in samples.iter().map(|s| self.derivative(s)) {
+        for (pose, j) in stops.iter().map(|s| self.derivative(s)) {
             let mut a = DMatrix::identity(6, 12);
             a.fixed_view_mut::<6, 6>(0, 6).copy_from(&adjoint(&pose.inverse()));
-            let a = a.rows(0, rows);
             n += a.tr_mul(&a);
-            rhs += a.tr_mul(&j.rows(0, rows));
+            rhs += a.tr_mul(&j);
         }
         let scale = n.diagonal().mean();
         (0..12).for_each(|k| n[(k, k)] += HELD * scale);
@@ -162,11 +151,6 @@ impl<'a> FlangeModel<'a> {
         self.base_is_fitted = true;
         self.fitted = [x.rows(0, 6).into_owned(), x.rows(6, 6).into_owned()];
         Some(self)
-    }
-
-    /// Whether it is relative to a base that fits, as nothing that stands still remains.
-    pub(super) const fn is_relative_to_a_base(&self) -> bool {
-        self.base_is_fitted
     }
 
     /// Pose relative to what stands still, and `J`, 6 x columns that act through the camera poses.
@@ -223,7 +207,7 @@ impl<'a> FlangeModel<'a> {
     }
 
     /// Sigma of the position over samples, RMS of the length, m.
-    pub fn sigma_m(&self, samples: &[Posture]) -> f64 {
+    pub(super) fn sigma_m(&self, samples: &[Posture]) -> f64 {
         let square = |s: &Posture| {
             let (pose, j) = self.derivative(s);
             let c = self.propagated(&pose, &j, self.covariance);
@@ -243,13 +227,6 @@ impl<'a> FlangeModel<'a> {
         [moved, self.sigma_m(&samples)]
     }
 
-    /// Upper end of the 95 % interval of the position error over samples, RMS of the length, over its sigma; none where nothing is uncertain.
-    pub fn most_in_sigmas(&self, samples: &[Posture]) -> Option<f64> {
-        let [_, most_m] = self.interval_m(samples, |_| Vector3::zeros(), Spread { variance: 0.0, sigma: 0.0 });
-        let ratio = most_m / self.sigma_m(samples);
-        ratio.is_finite().then_some(ratio)
-    }
-
     /// 95 % interval of the root mean square of an error that is known up to the errors of the model: `known` gives, in the frame of
     /// the flange, what of it is known, m; `beside` is the mean square of what has nothing to do with the model, m^2.
     pub(super) fn interval_m(
@@ -266,12 +243,6 @@ impl<'a> FlangeModel<'a> {
             sums.add(&j.fixed_rows::<3>(0).into_owned(), &known(k));
         }
         sums.interval_m(&self.covariance.view((0, 0), (n, n)).into_owned(), beside)
-    }
-
-    /// Sigma of the position where a joint is outside the range of the stops, within all joint limits: median of the lengths, m; none where nothing is.
-    pub(super) fn outside_m(&self) -> Option<f64> {
-        let found = everywhere(&self.robot).into_iter().map(|s| self.at(&s.readings));
-        median(found.filter(|f| !f.outside.is_empty()).map(|f| f.sigmas()[0]))
     }
 
     /// Samples of the region of the stops, then of everything within the joint limits.

@@ -10,12 +10,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::WorkspacePoint;
 use super::flange::{FlangeModel, everywhere};
 use super::limits::Limits;
-use super::promise::{FlangeErrors, NoiseAtStop, nominal_lacks_m, usual_joint_sigma};
+use super::promise::{FlangeErrors, NoiseAtStop, nominal_laid_over, usual_joint_sigma};
 use super::repeating::Repeats;
 use super::used_stops::{on_robot_sigmas, stops};
 use crate::geom::adjoint;
+use crate::linalg::median;
 use crate::linalg::{SymmetricFactor, symmetric_eigen};
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Layout, Restraint};
@@ -24,10 +26,10 @@ use crate::solve::Fit;
 /// Halvings of the interval of the factor.
 const HALVINGS: usize = 60;
 
-/// Sigma of the flange outside the region of the stops, m, where it is so large against the error of the nominal robot inside that it must be said:
-/// both with the base and the tool that fit best inside.
-pub fn extrapolation_m(flange: &FlangeErrors, limits: &Limits) -> Option<f64> {
-    flange.outside_m.filter(|outside_m| *outside_m > limits.extrapolation_ratio * flange.nominal_m)
+/// Sigma of the flange outside the region of the stops, m, where it is so large against the error of the nominal robot inside that it must be said.
+pub fn extrapolation_m(workspace: &[WorkspacePoint], nominal_m: f64, limits: &Limits) -> Option<f64> {
+    let outside: Vec<f64> = workspace.iter().filter(|w| !w.covered).map(|w| w.sigma_m).collect();
+    median(&outside).filter(|outside_m| *outside_m > limits.extrapolation_ratio * nominal_m)
 }
 
 /// What holds the robot near nominal, where a fit of bodies alone extrapolates badly and its joint errors are no noise; `None` where nothing asks for it.
@@ -39,10 +41,10 @@ pub fn restraint(fit: &Fit, limits: &Limits) -> Option<Restraint> {
     let (robot, layout, stops) = (&fit.state.robot, &fit.problem.layout, stops(&fit.problem));
     let model = FlangeModel::of(fit, &fit.covariance.reduced, limits)?;
     let joint_sigma = &usual_joint_sigma(&on_robot_sigmas(&fit.problem));
-    let flange = FlangeErrors::new(&model, (robot, None), NoiseAtStop { joint_sigma, told: None })?;
-    extrapolation_m(&flange, limits)?;
+    let flange = FlangeErrors::new(&model, (robot, None), NoiseAtStop { joint_sigma, told: None }, &stops)?;
+    extrapolation_m(&model.workspace(), flange.nominal_m, limits)?;
     let exported = robot.without_local_errors();
-    let displacement_m = nominal_lacks_m(&exported, &stops)?;
+    let displacement_m = nominal_laid_over(&exported, &stops)?.rms_m;
     // A column whose prior says that it is not nominal stays with that.
     let is_held = |c: &usize| {
         let column = &layout.columns[*c];

@@ -1,24 +1,21 @@
 //! What can be promised of the flange: its expected error in the region of the stops, by the model and its covariance.
 //!
-//! The error is that of the position at a stop of its own, with the base and the tool that fit the positions over the region best: where they
-//! are is a matter of measured frames, of no robot more than of another. Of the calibrated robot it is what the covariance says
-//! ([`FlangeModel::laid_over`]), and what no model removes: joint noise and local errors. A description that holds less of the model, the
-//! nominal robot among them, is displaced against it besides, by so much RMS over the region, laid over it in the same way; both parts add as
-//! squares. What is not known of base and tool stands beside these: how far the flange is off relative to what stands still (the plate, or a
-//! fixed camera).
+//! The error is that of the position relative to what stands still (the plate, or a fixed camera) at a stop of its own. Of the
+//! calibrated robot it is what the covariance says ([`FlangeModel`]: right on average over the stops), and what no model removes:
+//! joint noise and local errors. A description that holds less of the model is displaced against it besides, by so much RMS over
+//! the region; both parts add as squares. The nominal robot is given the base and the tool that fit it best.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use super::flange::FlangeModel;
-use super::points::{MeasuredPoint, lay_over};
+use super::points::{MeasuredPoint, PointFit, lay_over};
 use super::root_mean_square;
-use crate::geom::Pose;
 use crate::model::joint_terms::Term;
 use crate::model::robot::{Posture, Robot};
 use crate::solve::{JOINT_NOISE_FLOOR, NoiseInformation, Spread};
 
-/// Expected error of the position of the flange in the region of the stops, with the base and the tool that fit best, RMS of the length, m.
+/// Expected error of the position of the flange in the region of the stops, RMS of the length, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FlangeErrors {
     /// Of the nominal robot.
@@ -35,14 +32,6 @@ pub struct FlangeErrors {
     /// How far each of them may be off; absent in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intervals: Option<FlangeIntervals>,
-    /// What not knowing base and tool adds to the position relative to what stands still: how well the plate (or a fixed camera) is known to stand
-    /// in the base frame; none where it is gone, and in files of earlier versions, whose errors are relative to it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub placed_m: Option<f64>,
-    /// Sigma of the position outside the region, with the base and the tool that fit inside: median within all joint limits; none where the region
-    /// is all of it, and in files of earlier versions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub outside_m: Option<f64>,
     /// By how much of every length the size of the plate is in doubt, which none of these numbers has in it: relative, the largest of all plates;
     /// none where it is not, and in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -70,56 +59,47 @@ impl FlangeErrors {
         (self.alone_m.unwrap_or(self.urdf_m), interval)
     }
 
-    /// `alone` has the origins that do best by themselves ([`urdf_alone`](super::urdf_alone)). `None` where a robot cannot be laid over the model.
-    pub fn new(model: &FlangeModel, (robot, alone): (&Robot, Option<&Robot>), noise: NoiseAtStop<'_>) -> Option<Self> {
+    /// `alone` has the origins that do best by themselves ([`urdf_alone`](super::urdf_alone)). `None` where the nominal robot cannot be laid over the
+    /// model.
+    pub fn new(
+        model: &FlangeModel,
+        (robot, alone): (&Robot, Option<&Robot>),
+        noise: NoiseAtStop<'_>,
+        stops: &[Posture],
+    ) -> Option<Self> {
         let samples = model.region();
-        let laid_over = model.clone().laid_over(&samples)?;
         // Local errors belong to single readings of the series: at others they are noise.
         let whole = with(robot, |t| !matches!(t, Term::Local(_)));
+        let nominal = nominal_laid_over(&whole, &samples)?;
+        let lacking = displacements(&whole, &with(robot, |t| t == Term::Offset), &samples, stops);
+        let alone_lacks = alone.map(|alone| displacements(&whole, alone, &samples, stops));
         let scatter = noise.scatter(&by_readings(&whole, &samples));
         let scatter_m = scatter.variance.sqrt();
-        let sigma_m = laid_over.sigma_m(&samples);
-        let model_m = sigma_m.hypot(scatter_m);
-        let stated = |part: &Robot| {
-            let lacking = lacking(&whole, part, &samples)?;
-            Some((model_m.hypot(rms(&lacking)), laid_over.interval_m(&samples, |k| lacking[k], scatter)))
-        };
-        let (nominal_m, of_nominal) = stated(&Robot::nominal(whole.chain.clone()))?;
-        let (urdf_m, of_urdf) = stated(&with(robot, |t| t == Term::Offset))?;
-        let of_alone = alone.map(|alone| stated(alone).ok_or(())).transpose().ok()?;
-        let added = |relative_m: f64| (relative_m.powi(2) - sigma_m.powi(2)).max(0.0).sqrt();
+        let model_m = model.sigma_m(&samples).hypot(scatter_m);
+        let in_flange = |k: usize| exact(&whole, &samples[k]).rotation.transpose() * nominal.residuals_m[k];
+        let interval = |known: &dyn Fn(usize) -> Vector3<f64>| model.interval_m(&samples, known, scatter);
         Some(Self {
-            nominal_m,
-            urdf_m,
-            alone_m: of_alone.map(|(alone_m, _)| alone_m),
+            nominal_m: model_m.hypot(nominal.rms_m),
+            urdf_m: model_m.hypot(rms(&lacking)),
+            alone_m: alone_lacks.as_ref().map(|lacking| model_m.hypot(rms(lacking))),
             model_m,
             scatter_m,
             intervals: Some(FlangeIntervals {
-                nominal_m: of_nominal,
-                urdf_m: of_urdf,
-                alone_m: of_alone.map(|(_, interval)| interval),
-                model_m: laid_over.interval_m(&samples, |_| Vector3::zeros(), scatter),
+                nominal_m: interval(&in_flange),
+                urdf_m: interval(&|k| -lacking[k]),
+                alone_m: alone_lacks.as_ref().map(|lacking| interval(&|k| -lacking[k])),
+                model_m: interval(&|_| Vector3::zeros()),
             }),
-            placed_m: (!model.is_relative_to_a_base()).then(|| added(model.sigma_m(&samples))),
-            outside_m: laid_over.outside_m(),
             without_size_doubt: None,
         })
     }
 }
 
-/// What the nominal robot lacks of a corrected one at samples, with the base and the tool that fit best, RMS, m; `None` where none can be found.
-pub(super) fn nominal_lacks_m(corrected: &Robot, samples: &[Posture]) -> Option<f64> {
-    lacking(corrected, &Robot::nominal(corrected.chain.clone()), samples).map(|lacking| rms(&lacking))
-}
-
-/// How the flange of a robot stands to that of a description of it that holds less, at samples, in the frame of the flange, m: the description with
-/// the base and the tool that fit the positions best. `None` where none can be found.
-fn lacking(whole: &Robot, part: &Robot, samples: &[Posture]) -> Option<Vec<Vector3<f64>>> {
-    let poses: Vec<Pose> = samples.iter().map(|s| whole.pose_at(s, &vec![0.0; s.readings.len()])).collect();
+/// The nominal robot over a corrected one at samples, with a base and a tool that fit best; `None` where none can be found.
+pub(super) fn nominal_laid_over(corrected: &Robot, samples: &[Posture]) -> Option<PointFit> {
     let point =
-        |(s, pose): (&Posture, &Pose)| MeasuredPoint { position_m: pose.translation, readings: s.readings.clone() };
-    let fit = lay_over(part, &samples.iter().zip(&poses).map(point).collect::<Vec<_>>())?;
-    Some(poses.iter().zip(&fit.residuals_m).map(|(pose, left)| pose.rotation.transpose() * left).collect())
+        |s: &Posture| MeasuredPoint { position_m: exact(corrected, s).translation, readings: s.readings.clone() };
+    lay_over(&Robot::nominal(corrected.chain.clone()), &samples.iter().map(point).collect::<Vec<_>>())
 }
 
 /// The robot with some of its terms.
@@ -127,6 +107,17 @@ fn with(robot: &Robot, kept: impl Fn(Term) -> bool) -> Robot {
     let mut robot = robot.clone();
     robot.terms.retain(|t| kept(t.term));
     robot
+}
+
+fn exact(robot: &Robot, stop: &Posture) -> crate::geom::Pose {
+    robot.pose_at(stop, &vec![0.0; stop.readings.len()])
+}
+
+/// How the flange of a second robot stands to that of a first, in the frame of the flange, right on average over the stops, m.
+fn displacements(a: &Robot, b: &Robot, samples: &[Posture], stops: &[Posture]) -> Vec<Vector3<f64>> {
+    let twist = |s: &Posture| (exact(a, s).inverse() * exact(b, s)).log();
+    let mean = stops.iter().map(twist).sum::<Vector6<f64>>() / stops.len().max(1) as f64;
+    samples.iter().map(|s| (twist(s) - mean).fixed_rows::<3>(0).into_owned()).collect()
 }
 
 fn rms(displacements: &[Vector3<f64>]) -> f64 {
@@ -206,14 +197,14 @@ mod tests {
     fn an_arm_whose_axes_are_all_parallel_has_an_error_of_the_nominal_robot() {
         let mut robot = scara();
         let samples = halton_stops(&[(-2.5, 2.5), (-2.5, 2.5), (-0.1, 0.3), (-3.0, 3.0)], 100);
-        assert!(nominal_lacks_m(&robot, &samples).unwrap() < 1e-9);
+        assert!(nominal_laid_over(&robot, &samples).unwrap().rms_m < 1e-9);
         // The first link is 1 mm longer: base and tool take up a part of it.
         robot.twists[1][0] = 1e-3;
-        let rms_m = nominal_lacks_m(&robot, &samples).unwrap();
+        let rms_m = nominal_laid_over(&robot, &samples).unwrap().rms_m;
         assert!((1e-4..1e-3).contains(&rms_m), "{rms_m:e} m");
         // A shift along the axes is one of base or tool.
         robot.twists[1][0] = 0.0;
         robot.twists[2][2] = 1e-3;
-        assert!(nominal_lacks_m(&robot, &samples).unwrap() < 1e-9);
+        assert!(nominal_laid_over(&robot, &samples).unwrap().rms_m < 1e-9);
     }
 }

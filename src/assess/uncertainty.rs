@@ -97,7 +97,7 @@ pub fn judge(
     let noise = NoiseAtStop { joint_sigma, told: told.map(|told| (told, &shares[..])) };
     found.alone = model.as_ref().and_then(|m| urdf_alone(&state.robot, &problem.layout, &m.region()));
     let robots = (&state.robot, found.alone.as_ref());
-    let promise = |m: &FlangeModel| FlangeErrors::new(m, robots, noise);
+    let promise = |m: &FlangeModel| FlangeErrors::new(m, robots, noise, &stops);
     found.flange = model.as_ref().and_then(promise);
     found.workspace = model.map(|m| m.workspace()).unwrap_or_default();
     found.covariance = stated;

@@ -7,16 +7,16 @@ use crate::error::Code;
 /// Outside the region of the stops the corrected robot is known worse than the nominal one misses inside.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extrapolates {
-    /// Sigma of the position of the flange outside the region of the stops, with the base and the tool that fit inside, m.
+    /// Sigma of the flange outside the region of the stops, m.
     pub outside_m: f64,
     /// Error of the nominal robot in the region of the stops, m.
     pub nominal_m: f64,
 }
 
 pub(super) fn check(uncertainty: &Uncertainty, _: &Accuracy, setting: &CheckContext) -> Option<Extrapolates> {
-    let flange = uncertainty.flange?;
-    let outside_m = extrapolation_m(&flange, setting.limits)?;
-    Some(Extrapolates { outside_m, nominal_m: flange.nominal_m })
+    let nominal_m = uncertainty.flange?.nominal_m;
+    let outside_m = extrapolation_m(&uncertainty.workspace, nominal_m, setting.limits)?;
+    Some(Extrapolates { outside_m, nominal_m })
 }
 
 impl Kind for Extrapolates {
@@ -45,7 +45,7 @@ impl Kind for Extrapolates {
 
     fn seen(&self) -> String {
         format!(
-            "outside the region of the stops the flange is known to {:.1} mm only (inside, the nominal robot is off by {:.1} mm; base and tool fitted there)",
+            "outside the region of the stops the flange is known to {:.1} mm only (inside, the nominal robot is off by {:.1} mm)",
             1e3 * self.outside_m,
             1e3 * self.nominal_m
         )

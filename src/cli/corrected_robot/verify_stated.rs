@@ -65,7 +65,7 @@ impl Stated {
         stated.map_or_else(Limits::default, |s| s.found.limits)
     }
 
-    /// At the stops of series, relative to what stands still: markers as far from the flange as that is.
+    /// At the stops of series: markers as far from the flange as what stands still is.
     pub fn at_stops(&self, series: &[MeasuredSeries]) -> Option<Expectation> {
         let flange = self.found.flange()?;
         let stops: Vec<Posture> = series.iter().flat_map(postures).collect();
@@ -85,8 +85,9 @@ impl Stated {
         let [model_m, lacking_m] = [rms(of_model), rms(lacking)];
         // The stated scatter stands for that at the stops.
         let [at_stops_m, most_m] = self.scatter_m(&by_readings(&self.found.robot, &stops), stops.len());
-        let scatter_m = self.record.flange?.scatter_m;
-        let widening = flange.most_in_sigmas(&stops).unwrap_or(NORMAL_95);
+        let stated = self.record.flange?;
+        let scatter_m = stated.scatter_m;
+        let widening = stated.intervals.map_or(NORMAL_95, |i| i.model_m[1] / stated.model_m);
         let expected = self
             .expectation(([model_m, widening * model_m], lacking_m), [scatter_m, scatter_m + (most_m - at_stops_m)])?;
         // What was found for images that the fit had not seen is of this kind.

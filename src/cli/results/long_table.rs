@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::summary::{in_words, with_remedy};
-use crate::assess::{Cause, Errors, FlangeErrors, Identifiability, UnknownDirection};
+use crate::assess::{Cause, Errors, Identifiability, UnknownDirection};
 use crate::error::Notice;
 use crate::identify::{Comparison, Estimator, LensEvidence};
 use crate::linalg::median;
@@ -141,21 +141,24 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let mm = |m: f64| format!("{:>8.3} mm", 1e3 * m);
     writeln!(
         out,
-        "flange    expected error of its position {}, {}, by model and covariance, RMS:",
-        r.flange_holds(),
-        r.flange_fits()
+        "flange    expected error of its position relative to {} {}, by model and covariance, RMS:",
+        r.flange_is_relative_to(),
+        r.flange_holds()
     )?;
     let (alone_m, _) = e.best_urdf_m();
     if r.has_no_robot() {
-        writeln!(out, "          as given   {}   poses of the controller", mm(alone_m))?;
-        let scatter_mm = 1e3 * e.scatter_m;
         writeln!(
             out,
-            "          {scatter_mm:.3} mm of it is how these poses are off from stop to stop: errors of the controller's own model of the robot among them, which are others between them; --urdf takes them away"
+            "          as given   {}   poses of the controller, with camera and plate as found",
+            mm(alone_m)
         )?;
-        return placed(out, r, e);
+        let scatter_mm = 1e3 * e.scatter_m;
+        return writeln!(
+            out,
+            "          {scatter_mm:.3} mm of it is how these poses are off from stop to stop: errors of the controller's own model of the robot among them, which are others between them; --urdf takes them away"
+        );
     }
-    writeln!(out, "          nominal    {}", mm(e.nominal_m))?;
+    writeln!(out, "          nominal    {}   base and tool that fit it best", mm(e.nominal_m))?;
     writeln!(out, "          calibrated {}   corrected URDF alone", mm(alone_m))?;
     if r.beyond_urdf() {
         if e.alone_m.is_some() {
@@ -164,20 +167,7 @@ fn flange(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         }
         writeln!(out, "          calibrated {}   with compensation.toml", mm(e.model_m))?;
     }
-    writeln!(
-        out,
-        "          {:.3} mm of each is noise from stop to stop, which no model takes away",
-        1e3 * e.scatter_m
-    )?;
-    placed(out, r, e)
-}
-
-/// How well it is known where what stands still is in the base frame.
-fn placed(out: &mut String, r: &SolutionRecord, e: &FlangeErrors) -> std::fmt::Result {
-    let Some(placed_m) = e.placed_m else { return Ok(()) };
-    let words = "how well it is known in the base frame, beside these: counts for places that are given relative to it, and not in frames measured with \
-                 the corrected robot";
-    writeln!(out, "          {:<10} {:>8.3} mm   {words}", r.stands_still(), 1e3 * placed_m)
+    writeln!(out, "          {:.3} mm of each is noise from stop to stop, which no model takes away", 1e3 * e.scatter_m)
 }
 
 fn limited(out: &mut String, label: &str, lines: impl Iterator<Item = String>) -> std::fmt::Result {

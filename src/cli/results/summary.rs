@@ -121,10 +121,6 @@ fn flange(r: &SolutionRecord) -> Vec<String> {
     if r.beyond_urdf() {
         lines.push(row("with compensation.toml", e.model_m, i.map(|i| i.model_m)));
     }
-    lines.extend(e.placed_m.map(|placed_m| {
-        let what = format!("{} in the base frame", r.stands_still());
-        row(&what, placed_m, None) + "  (above: base and tool fitted)"
-    }));
     lines.extend(e.without_size_doubt.map(|doubt| {
         format!(
             "          without the size of the plate, in doubt by {:.2} %: every length is off by as much if it is",

@@ -2,7 +2,6 @@
 
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::error::{Code, Error, Result};
-use crate::model::robot::Posture;
 use crate::output::restore::{FoundModel, entered_offsets, found_model};
 use crate::output::solution_json::SolutionRecord;
 use crate::problem::short_name;
@@ -21,7 +20,7 @@ pub struct Difference {
     pub worst_m: f64,
     /// Readings at the worst place.
     pub worst_at: Vec<f64>,
-    /// RMS of the stated sigmas of both together at these places, base frames and a point of the flange fitted out, m; none where a solution has no map.
+    /// RMS of the stated sigmas of both together at these places, m; none where a solution has no map.
     pub stated_m: Option<f64>,
 }
 
@@ -118,16 +117,19 @@ fn difference(a: &FoundModel, b: &FoundModel, places: &[&Place]) -> Option<Diffe
         .collect();
     let fit = fit_points(&b.robot, &points)?;
     let (worst, worst_m) = (fit.residuals_m.iter().map(|r| r.norm()).enumerate()).max_by(|x, y| x.1.total_cmp(&y.1))?;
-    // The same is fitted out of what is stated.
-    let samples: Vec<Posture> = places.iter().map(|p| Posture::at(&p.readings)).collect();
-    let sigma_m = |model: &FoundModel| Some(model.flange()?.laid_over(&samples)?.sigma_m(&samples));
-    let stated_m = sigma_m(a).zip(sigma_m(b)).map(|(a, b)| a.hypot(b));
+    let stated = || {
+        let (a, b) = (a.flange()?, b.flange()?);
+        let sum: f64 = (places.iter())
+            .map(|p| a.at(&p.readings).sigmas()[0].powi(2) + b.at(&p.readings).sigmas()[0].powi(2))
+            .sum();
+        Some((sum / places.len() as f64).sqrt())
+    };
     Some(Difference {
         places: places.len(),
         rms_m: fit.rms_m,
         worst_m,
         worst_at: places[worst].readings.clone(),
-        stated_m,
+        stated_m: stated(),
     })
 }
 

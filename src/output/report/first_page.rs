@@ -88,20 +88,11 @@ fn promise(r: &SolutionRecord, trust: Trust) -> Markup {
                 td.n { b { (significant(1e3 * m)) " mm" } }
                 @if let Some([low, high]) = interval { td.n { (significant(1e3 * low)) " to " (significant(1e3 * high)) } }
                 td.meter { span.bar { i.(class) style={ "width:" (format!("{:.0}", 100.0 * m / most)) "%" } {} } }
-            } } @if let Some(placed_m) = e.placed_m { tr {
-                th scope="row" { "Beside these: " (r.stands_still()) " in the base frame" }
-                td.n { (significant(1e3 * placed_m)) " mm" }
-                @if i.is_some() { td {} }
-                td {}
             } } }
         } }
         p.note {
-            "Position of the flange " (r.flange_holds()) ", " (r.flange_fits()) ", by model and covariance. "
-            @if e.placed_m.is_some() {
-                "How well the " (r.stands_still()) " is known in the base frame counts for places that are given relative to it; frames that are measured with the \
-                 corrected robot take it up. "
-            }
-            (significant(1e3 * e.scatter_m))
+            "Position of the flange relative to " (r.flange_is_relative_to()) " " (r.flange_holds()) ", by model and covariance"
+            @if !r.has_no_robot() { "; the nominal robot with the base and the tool that fit it best" } ". " (significant(1e3 * e.scatter_m))
             @if r.has_no_robot() {
                 " mm of it is how the poses of the controller are off from stop to stop: errors of its own model of the robot among them, which a run with "
                 code { "--urdf" } " takes away. Between these poses those errors are others, and the flange may be off by more. "

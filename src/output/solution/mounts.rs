@@ -1,8 +1,6 @@
 //! Where the cameras of a solution are: of one robot some may be in the hand and others in the cell.
 
 use super::solution_json::SolutionRecord;
-use crate::assess::Standing;
-use crate::problem::Names;
 use crate::series::CameraMount;
 
 impl SolutionRecord {
@@ -14,24 +12,6 @@ impl SolutionRecord {
     /// Where the camera of this mounting is; none without an image on the robot.
     pub fn mount_of_mounting(&self, mounting: usize) -> Option<CameraMount> {
         self.images.iter().find(|i| i.is_on_robot() && i.mounting == mounting).map(|i| i.camera_mount)
-    }
-
-    /// Which base and tool the expected errors of the flange are stated with, in words: in files of earlier versions they are relative to the plate.
-    pub fn flange_fits(&self) -> &'static str {
-        let is_earlier = !self.images.is_empty() && self.flange.is_some_and(|e| e.placed_m.is_none());
-        if is_earlier { "relative to the plate" } else { "with the base and the tool that fit best" }
-    }
-
-    /// What stands still for most images on the robot, in a word.
-    pub fn stands_still(&self) -> &'static str {
-        let mountings: Vec<String> = self.mountings.iter().map(|m| m.name.clone()).collect();
-        let placements: Vec<String> = self.placements.iter().map(|p| p.name.clone()).collect();
-        let names = Names { mountings: &mountings, placements: &placements, ..Names::default() };
-        let used = self.images.iter().filter(|i| i.is_used_on_robot());
-        match Standing::of_most(used.map(|i| Standing::of(i.camera_mount, i.mounting, i.placement)), &names) {
-            Some(Standing::Mounting(_)) => "camera",
-            _ => "plate",
-        }
     }
 }
 

@@ -507,7 +507,7 @@ impl SolutionRecord {
         self.robot.terms.iter().any(|t| t.term != "offset" && !t.term.starts_with("local_"))
     }
 
-    /// What the position of the flange is stated relative to at single readings, in words.
+    /// What the position of the flange is stated relative to, in words.
     pub fn flange_is_relative_to(&self) -> &'static str {
         if self.images.is_empty() { "the base and tool that fit the stops" } else { "the plate" }
     }

@@ -104,9 +104,7 @@ pub(in crate::output::report) fn workspace(r: &SolutionRecord) -> Markup {
     let (bounds, agree) = (bounds(r), r.limits().scatter_ratio);
     html! {
         p {
-            "Uncertainty of the position of the flange relative to " (r.flange_is_relative_to()) ", one sigma over all three axes, by the calibrated model"
-            @if r.flange.is_some_and(|e| e.placed_m.is_some()) { "; how well the " (r.stands_still()) " is known in the base frame is in it" }
-            ". "
+            "Uncertainty of the position of the flange relative to " (r.flange_is_relative_to()) ", one sigma over all three axes, by the calibrated model. "
             "Joint noise of a single move comes on top. "
             @if let Some(sigma_mm) = inside {
                 "In the region of the stops it is typically " b { (significant(sigma_mm)) " mm" } "; "
