@@ -68,6 +68,13 @@ fn told_directions(tips: &[Pose], tip_point: &Vector3<f64>) -> Option<usize> {
     Some(symmetric_eigen(&scaled)?.0.iter().filter(|value| **value > DETERMINED).count())
 }
 
+/// Normal equations whose first nine unknowns are frame and reflector, with what points do not tell of these held.
+pub(super) fn held_weakly(mut normal: DMatrix<f64>) -> DMatrix<f64> {
+    let scale = normal.view((0, 0), (9, 9)).diagonal().mean();
+    (0..9).for_each(|k| normal[(k, k)] += HELD * scale);
+    normal
+}
+
 /// The same where only the residuals matter.
 pub(super) fn lay_over(robot: &Robot, points: &[MeasuredPoint]) -> Option<PointFit> {
     fit_points(robot, points).or_else(|| fit(robot, points, HELD))
@@ -191,7 +198,7 @@ impl PointFit {
         joint_sigma: &[f64],
     ) -> Option<ExpectedRms> {
         let d = self.derivatives(robot, points, covariance.nrows(), joint_sigma);
-        let normal = SymmetricFactor::new(&(d.fitted.transpose() * &d.fitted)).ok()?;
+        let normal = SymmetricFactor::new(&held_weakly(d.fitted.transpose() * &d.fitted)).ok()?;
         let left = |j: &DMatrix<f64>| j - &d.fitted * normal.solve_many(&(d.fitted.transpose() * j));
         let (model, noise) = (left(&d.by_model), left(&d.by_noise));
         let n = points.len() as f64;

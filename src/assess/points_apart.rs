@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6, Vector3, Vector6};
 
 use super::Limits;
-use super::points::{Derivatives, MeasuredPoint, PointFit, by_frame_and_reflector, fit_points};
+use super::points::{Derivatives, MeasuredPoint, PointFit, by_frame_and_reflector, fit_points, held_weakly};
 use super::statistics::log_chance;
 use super::usual_errors::usual_errors;
 use crate::linalg::{SymmetricFactor, median};
@@ -125,11 +125,12 @@ pub fn device_moved(robot: &Robot, points: &[MeasuredPoint], fit: &PointFit, lim
     let alone = SteppedFit::new(by_frame.clone(), fit.residuals_m.clone())?;
     let beside_errors = || {
         let (rows, residuals) = beside_usual_errors(robot, points, fit, limits)?;
-        SteppedFit::new(rows, residuals)?.credible_step(limits)
+        let freedom = (3 * points.len()).saturating_sub(9) as f64;
+        SteppedFit::new(rows, residuals)?.credible_step(freedom, limits)
     };
     let (step, cause) = match beside_errors() {
         Some(step) => (step, StepCause::Device),
-        None => (alone.credible_step(limits)?, StepCause::DeviceOrRobot),
+        None => (alone.credible_step(0.0, limits)?, StepCause::DeviceOrRobot),
     };
     let Step { first, change, .. } = step;
     let displaced: f64 = by_frame[first..].iter().map(|d| (d.fixed_columns::<6>(0) * change).norm_squared()).sum();
@@ -201,7 +202,7 @@ impl SteppedFit {
             normal.gemm_tr(1.0, d, d, 1.0);
             score.gemv_tr(1.0, d, r, 1.0);
         }
-        let normal = SymmetricFactor::new(&normal).ok()?;
+        let normal = SymmetricFactor::new(&held_weakly(normal)).ok()?;
         let found = normal.solve(&score);
         let residuals: Vec<Vector3<f64>> = by.iter().zip(residuals).map(|(d, r)| r - d * &found).collect();
         let of_errors = found.rows(9, columns - 9).norm_squared();
@@ -238,10 +239,10 @@ impl SteppedFit {
         all
     }
 
-    /// The best of them, where it is credible.
-    fn credible_step(&self, limits: &Limits) -> Option<Step> {
+    /// The best of them, where it is credible: against at least so much of squares as noise leaves.
+    fn credible_step(&self, least: f64, limits: &Limits) -> Option<Step> {
         let best = self.steps(limits.displaced_images).into_iter().max_by(|a, b| a.fall.total_cmp(&b.fall))?;
-        let share = best.fall / self.squares;
+        let share = best.fall / self.squares.max(least);
         let left = (3 * self.by.len()).saturating_sub(9) as f64;
         let chance = log_chance(share, left, 6) + (self.by.len() as f64).ln();
         (share > limits.displaced_share && chance <= limits.displaced_false_alarms.ln()).then_some(best)

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::Limits;
 use super::flange::everywhere;
-use super::points::{Derivatives, MeasuredPoint, PointFit};
+use super::points::{Derivatives, MeasuredPoint, PointFit, held_weakly};
 use super::usual_errors::usual_errors;
 use crate::linalg::SymmetricFactor;
 use crate::model::robot::Robot;
@@ -66,7 +66,7 @@ fn mean_squares(all: impl Iterator<Item = Derivatives>, sigmas: &[f64]) -> Optio
         fitted.gemm_tr(1.0, &by_fitted, &by_fitted, 1.0);
         count += 1.0;
     }
-    let taken = SymmetricFactor::new(&fitted).ok()?.solve_many(&mixed);
+    let taken = SymmetricFactor::new(&held_weakly(fitted)).ok()?.solve_many(&mixed);
     own -= mixed.tr_mul(&taken);
     Some(DMatrix::from_fn(n, n, |i, k| sigmas[i] * own[(i, k)] * sigmas[k] / f64::max(count, 1.0)))
 }

@@ -390,6 +390,16 @@ fn readings_in_another_unit_are_no_good_verdict() {
     assert!(!wrong.status.success() && said.contains("--joint-unit"), "{said}");
 }
 
+/// What wide priors of the robot absorb leaves so little of the noise that six numbers explain most of it.
+#[test]
+fn few_faultless_points_are_of_no_device_that_moved() {
+    let (_, robot) = kr6();
+    for count in 15..25 {
+        let found = verdict(&points(&robot, count, 5e-5), "rad", None);
+        assert!(found.status.success(), "{count}: {}", String::from_utf8_lossy(&found.stdout));
+    }
+}
+
 /// As `identify` names them in a tracker's points.
 #[test]
 fn left_handed_axes_and_rows_that_are_shifted_by_one_are_named() {

@@ -195,8 +195,9 @@ fn refuse_mistaken(model: &Judged, urdf: &Path, file: &Path, limits: &Limits) ->
         }
         ReadingMistake::Mirrored => (
             Code::AxesMirrored,
-            "with one axis of theirs reversed: the axes of the device are left-handed".into(),
-            "export in right-handed axes, or change the sign of one of x_m, y_m, z_m",
+            "with one axis of theirs reversed: the axes of the device are left-handed, or the joints that turn the arm to its sides count the other way"
+                .into(),
+            "move one of these joints alone and look which way it turns: correct the signs of their columns, or export in right-handed axes",
         ),
         ReadingMistake::Shifted(by_one_above) => {
             let row = if by_one_above { "below" } else { "above" };

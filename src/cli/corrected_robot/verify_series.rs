@@ -151,13 +151,15 @@ fn weigh(
 /// A model that is judged with its own zeros, which do not fit: there is no figure of it, and which zeros would fit is said.
 fn of_other_zeros(args: &VerifyArgs, model: &Model, seen: &Seen<'_>, other: &RobotOfOtherZeros) -> Result<Reasons> {
     let urdf = &args.urdf;
-    let with_these = judged((&other.robot, urdf), seen.series, &model.limits)?.into_images();
+    let with_these = judged((&other.robot, urdf), seen.series, &model.limits);
     say_line!(
         "model     {}: as it is, readings and images miss by {:.0} (median, mm plus mrad): nothing can be fitted",
         urdf.display(),
         1e3 * other.misfit
     );
-    say_line!("{}", line("zeros", urdf, &with_these.iter().collect::<Vec<_>>()) + ", with those that fit");
+    if let Some(images) = with_these.map(JudgedSeries::into_images).ok().filter(|images| !images.is_empty()) {
+        say_line!("{}", line("zeros", urdf, &images.iter().collect::<Vec<_>>()) + ", with those that fit");
+    }
     let mut reasons = Reasons::default();
     let subject = urdf.display().to_string();
     match by_other_readings(urdf, model, seen) {

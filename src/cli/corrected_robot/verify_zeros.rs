@@ -45,8 +45,9 @@ pub(super) fn read_otherwise(
 ) -> Option<FileFinding> {
     let expected = stated.at_stops(series)?;
     let (word, mm) = (zeros.other(), 1e3 * rms_m);
+    let or_enter = if word == "before" { ", or enter them" } else { "" };
     let text = format!(
-        "{}: with the readings as they are taken the model misses more than its solution states, and {mm:.3} mm RMS with them as those of the controller {word} the offsets of mastering.csv were entered: say --readings {word}, or enter them",
+        "{}: with the readings as they are taken the model misses more than its solution states, and {mm:.3} mm RMS with them as those of the controller {word} the offsets of mastering.csv were entered: say --readings {word}{or_enter}",
         urdf.display()
     );
     let is_other = exceeded((urdf, rms_m), &stated.path, expected, limits).is_none();
