@@ -262,7 +262,7 @@ fn without_contradicting(mut outcome: Outcome, components: &ComponentOptions, li
         let stops = reject_stops(&mut outcome.adjustment) || reject_contradicting(&mut outcome.adjustment).is_some();
         let of_images = if stops { 0 } else { reject_observations(&mut outcome.adjustment) };
         let anything = stops || of_images + reject_bodies(&mut outcome.adjustment) > 0;
-        if !anything && !leave_worst_out(&mut outcome, components, limits) {
+        if !anything && !leave_worst_out(&mut outcome, limits) {
             break;
         }
         outcome = estimate_components_near(outcome.adjustment, components);

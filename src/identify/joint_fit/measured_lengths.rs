@@ -3,7 +3,7 @@
 
 use crate::assess::Limits;
 use crate::problem::Problem;
-use crate::solve::{ComponentOptions, LengthMisfit, LinearProblem, Outcome, Status, estimate_components_near};
+use crate::solve::{LengthMisfit, LinearProblem, Outcome, Status};
 
 /// Leaves all of them out.
 pub(super) fn leave_all_out(problem: &mut Problem) {
@@ -21,32 +21,19 @@ pub(super) fn take_agreeing(outcome: &mut Outcome, limits: &Limits) -> bool {
     lengths.iter().any(|l| !l.left_out)
 }
 
-/// Leaves the one out that the others contradict most; true where there is one. A wrong one that takes part grows the noise by which it is judged: one that
-/// is doubtful is judged by the fit without it.
-pub(super) fn leave_worst_out(outcome: &mut Outcome, components: &ComponentOptions, limits: &Limits) -> bool {
-    let used: Vec<usize> = outcome.adjustment.problem.used_lengths().map(|(k, _)| k).collect();
+/// Leaves the one out that the others contradict most; true where there is one.
+pub(super) fn leave_worst_out(outcome: &mut Outcome, limits: &Limits) -> bool {
+    let problem = &outcome.adjustment.problem;
+    let used: Vec<usize> = problem.used_lengths().map(|(k, _)| k).collect();
     if used.is_empty() {
         return false;
     }
-    let worst = misfits(outcome).into_iter().filter(|m| used.contains(&m.index));
-    let Some(worst) = worst.max_by(|a, b| a.deviate.abs().total_cmp(&b.deviate.abs())) else { return false };
-    let is_beyond = |misfit: &LengthMisfit, sigmas| misfit.is_beyond(sigmas, used.len());
-    if !is_beyond(&worst, limits.distance_doubtful) {
-        return false;
+    let beyond = |m: &LengthMisfit| used.contains(&m.index) && m.is_beyond(limits.distance_sigmas, used.len());
+    let worst = misfits(outcome).into_iter().filter(beyond).max_by(|a, b| a.deviate.abs().total_cmp(&b.deviate.abs()));
+    if let Some(worst) = worst {
+        outcome.adjustment.problem.lengths[worst.index].left_out = true;
     }
-    let mut without = outcome.adjustment.clone();
-    without.problem.lengths[worst.index].left_out = true;
-    if is_beyond(&worst, limits.distance_sigmas) {
-        outcome.adjustment = without;
-        return true;
-    }
-    let without = estimate_components_near(without, components);
-    let is_contradicted =
-        misfits(&without).iter().any(|m| m.index == worst.index && is_beyond(m, limits.distance_sigmas));
-    if is_contradicted {
-        *outcome = without;
-    }
-    is_contradicted
+    worst.is_some()
 }
 
 /// Of a fit that converged; else none.
