@@ -32,6 +32,9 @@ pub struct PointFit {
     pub rms_m: f64,
 }
 
+/// Unknowns of frame and reflector.
+pub(super) const FITTED: usize = 9;
+
 /// Share of their mean by which the normal equations are held where the points do not determine frame and reflector.
 const HELD: f64 = 1e-9;
 
@@ -69,10 +72,20 @@ fn told_directions(tips: &[Pose], tip_point: &Vector3<f64>) -> Option<usize> {
 }
 
 /// Normal equations whose first nine unknowns are frame and reflector, with what points do not tell of these held.
-pub(super) fn held_weakly(mut normal: DMatrix<f64>) -> DMatrix<f64> {
-    let scale = normal.view((0, 0), (9, 9)).diagonal().mean();
-    (0..9).for_each(|k| normal[(k, k)] += HELD * scale);
+pub(super) fn held_weakly(normal: DMatrix<f64>) -> DMatrix<f64> {
+    held_by(HELD, normal)
+}
+
+/// The same with this share of their mean.
+fn held_by(share: f64, mut normal: DMatrix<f64>) -> DMatrix<f64> {
+    let scale = normal.view((0, 0), (FITTED, FITTED)).diagonal().mean();
+    (0..FITTED).for_each(|k| normal[(k, k)] += share * scale);
     normal
+}
+
+/// Residuals of points beyond the unknowns of frame and reflector.
+pub(super) fn freedom(points: usize) -> f64 {
+    (3 * points).saturating_sub(FITTED) as f64
 }
 
 /// The same where only the residuals matter.
@@ -108,9 +121,7 @@ fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>, held
             n += j.transpose() * j;
             b += j.transpose() * r;
         }
-        let scale = n.diagonal().mean();
-        (0..9).for_each(|k| n[(k, k)] += held * scale);
-        let step = SymmetricFactor::new(&n).ok()?.solve(&b);
+        let step = SymmetricFactor::new(&held_by(held, n)).ok()?.solve(&b);
         frame = frame.perturbed(&step.fixed_rows::<6>(0).into_owned());
         tip_point += Vector3::new(step[6], step[7], step[8]);
         if step.norm() < 1e-12 {

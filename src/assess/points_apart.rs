@@ -3,7 +3,9 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6, Vector3, Vector6};
 
 use super::Limits;
-use super::points::{Derivatives, MeasuredPoint, PointFit, by_frame_and_reflector, fit_points, held_weakly};
+use super::points::{
+    Derivatives, FITTED, MeasuredPoint, PointFit, by_frame_and_reflector, fit_points, freedom, held_weakly,
+};
 use super::statistics::log_chance;
 use super::usual_errors::usual_errors;
 use crate::linalg::{SymmetricFactor, median};
@@ -71,7 +73,7 @@ fn wrong_points(
     let kept: Vec<usize> = (0..points.len()).filter(is_kept).collect();
     let others =
         SteppedFit::new(kept.iter().map(|k| rows[*k].clone()).collect(), kept.iter().map(|k| residuals[*k]).collect())?;
-    let freedom = (3 * kept.len()).saturating_sub(FITTED) as f64;
+    let freedom = freedom(kept.len());
     let squares = others.squares.max(freedom);
     let most = limits.displaced_false_alarms.ln() - (points.len() as f64).ln();
     let is_wrong = |k: &usize| {
@@ -81,9 +83,6 @@ fn wrong_points(
     };
     Some(odd.iter().copied().filter(is_wrong).collect())
 }
-
-/// Unknowns of frame and reflector.
-const FITTED: usize = 9;
 
 /// Coordinates of a point.
 const POINT: usize = 3;
@@ -125,8 +124,7 @@ pub fn device_moved(robot: &Robot, points: &[MeasuredPoint], fit: &PointFit, lim
     let alone = SteppedFit::new(by_frame.clone(), fit.residuals_m.clone())?;
     let beside_errors = || {
         let (rows, residuals) = beside_usual_errors(robot, points, fit, limits)?;
-        let freedom = (3 * points.len()).saturating_sub(9) as f64;
-        SteppedFit::new(rows, residuals)?.credible_step(freedom, limits)
+        SteppedFit::new(rows, residuals)?.credible_step(freedom(points.len()), limits)
     };
     let (step, cause) = match beside_errors() {
         Some(step) => (step, StepCause::Device),
@@ -243,8 +241,7 @@ impl SteppedFit {
     fn credible_step(&self, least: f64, limits: &Limits) -> Option<Step> {
         let best = self.steps(limits.displaced_images).into_iter().max_by(|a, b| a.fall.total_cmp(&b.fall))?;
         let share = best.fall / self.squares.max(least);
-        let left = (3 * self.by.len()).saturating_sub(9) as f64;
-        let chance = log_chance(share, left, 6) + (self.by.len() as f64).ln();
+        let chance = log_chance(share, freedom(self.by.len()), 6) + (self.by.len() as f64).ln();
         (share > limits.displaced_share && chance <= limits.displaced_false_alarms.ln()).then_some(best)
     }
 }

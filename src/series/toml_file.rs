@@ -31,22 +31,18 @@ pub(super) const SIGMA_IN_RAD: &str = "write it in rad: 0.0001 for 0.0057 deg";
 
 /// Refuses the standard deviation of a coordinate that is not positive, or not in metres.
 pub(super) fn require_sigma_m(path: &Path, key: &str, value: Option<f64>) -> Result<()> {
-    require_positive(path, key, value)?;
-    match value {
-        Some(v) if v >= LARGEST_SIGMA_M => {
-            Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), SIGMA_IN_METRES))
-        }
-        _ => Ok(()),
-    }
+    require_sigma_below((LARGEST_SIGMA_M, SIGMA_IN_METRES), path, key, value)
 }
 
 /// Refuses the standard deviation of a rotation that is not positive, or not in rad.
 pub(super) fn require_sigma_rad(path: &Path, key: &str, value: Option<f64>) -> Result<()> {
+    require_sigma_below((LARGEST_SIGMA_RAD, SIGMA_IN_RAD), path, key, value)
+}
+
+fn require_sigma_below((largest, remedy): (f64, &str), path: &Path, key: &str, value: Option<f64>) -> Result<()> {
     require_positive(path, key, value)?;
     match value {
-        Some(v) if v >= LARGEST_SIGMA_RAD => {
-            Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), SIGMA_IN_RAD))
-        }
+        Some(v) if v >= largest => Err(Error::new(Code::SettingRange, path.display(), format!("{key} = {v}"), remedy)),
         _ => Ok(()),
     }
 }

@@ -51,7 +51,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/patterns.rs POWER_95", "quantile of the normal distribution"),
     ("assess/points.rs DETERMINED", "rounding of an eigenvalue"),
     ("assess/points.rs HELD", "what the points do not tell is held by so little that it decides nothing"),
-    ("assess/points_apart.rs FITTED", "unknowns of frame and reflector"),
+    ("assess/points.rs FITTED", "unknowns of frame and reflector"),
     ("assess/points_apart.rs POINT", "coordinates of a point"),
     ("assess/projection.rs ACROSS", "grid of a map"),
     ("assess/repeating.rs FEWEST", "samples of a variance"),

@@ -40,12 +40,20 @@ impl Linear {
 
     /// Given places that were touched more than once, each at all its touches: a single one may as well be another than is said.
     fn misstated(&self, problem: &Problem) -> Vec<Candidate> {
+        let place = |first: usize| problem.body_measurements[first].seen.position();
+        let places_of = |instrument: usize| {
+            let own = problem.used_bodies().filter(move |(_, measured)| measured.instrument == instrument);
+            own.map(|(k, _)| place(k)).collect::<Vec<_>>()
+        };
+        let is_told = |instrument: &usize| {
+            problem.instruments[*instrument].kind == InstrumentKind::Places && tell_which(&places_of(*instrument))
+        };
+        let told: BTreeSet<usize> = (0..problem.instruments.len()).filter(is_told).collect();
         let mut all: Vec<Candidate> = Vec::new();
-        for (first, measured) in problem.used_bodies() {
-            let (changed, instrument) =
-                (Changed::Place { first, instrument: measured.instrument }, &problem.instruments[measured.instrument]);
+        for (first, measured) in problem.used_bodies().filter(|(_, measured)| told.contains(&measured.instrument)) {
+            let changed = Changed::Place { first, instrument: measured.instrument };
             let is_known = |c: &Candidate| matches!(c.changed, Changed::Place { first: other, .. } if Shown::Measurement(other).tells_of(problem, changed));
-            if instrument.kind != InstrumentKind::Places || all.iter().any(is_known) {
+            if all.iter().any(is_known) {
                 continue;
             }
             let telling = |r: &usize| self.rows[*r].of(problem, changed).next().is_some();
@@ -55,12 +63,6 @@ impl Linear {
                 all.push(Candidate { changed, order: Order::Whole, group, rows: Rc::new(rows), from: 0, fewest: 0 });
             }
         }
-        let place = |first: usize| problem.body_measurements[first].seen.position();
-        let of = |instrument: usize| {
-            let own = problem.used_bodies().filter(move |(_, measured)| measured.instrument == instrument);
-            own.map(|(k, _)| place(k)).collect::<Vec<_>>()
-        };
-        all.retain(|c| matches!(c.changed, Changed::Place { instrument, .. } if tell_which(&of(instrument))));
         all
     }
 

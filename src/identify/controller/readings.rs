@@ -111,15 +111,14 @@ fn misread(way: ReadAs, poses: &ControllerPoses, place: String, fit: &str) -> Op
     let in_unit = |unit: &LengthUnit| format!("positions are in {}", unit.name);
     let to_metres = |unit: &LengthUnit| format!("multiply x_m, y_m and z_m by {}", unit.metres);
     match way.misplaced {
-        Some(Misplaced::Columns(a, b)) => {
-            let [a, b] = [a, b].map(|axis| ["x_m", "y_m", "z_m"][axis]);
-            let what = format!("{a} and {b} stand in each other's column: exchanged {fit}");
-            return Some(Error::new(Code::AxesMirrored, place, what, format!("exchange the columns {a} and {b}")));
+        Some(Misplaced::Columns(exchanged)) => {
+            let what = format!("{}: exchanged {fit}", exchanged.what());
+            return Some(Error::new(Code::AxesMirrored, place, what, exchanged.remedy()));
         }
         Some(Misplaced::Rows { below }) => {
-            let other = if below { "below" } else { "above" };
+            let (other, way) = if below { ("below", "down") } else { ("above", "up") };
             let what = format!("the poses are shifted by one row: with the pose of the row {other} {fit}");
-            let remedy = "shift the names in the first column of controller.csv by one row";
+            let remedy = format!("shift the names in the first column of controller.csv one row {way}");
             return Some(Error::new(Code::RowsShifted, place, what, remedy));
         }
         None => (),

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use crate::assess::Limits;
 use crate::geom::Pose;
 use crate::identify::bodies::placed::{SeenFrom, missed, placed};
+use crate::identify::mistakes::exchanged::Exchanged;
 use crate::identify::mistakes::suspects::some_of;
 use crate::identify::photogrammetry::free_poses::free_poses_of;
 use crate::init::{PosePair, hand_eye_misfit};
@@ -33,7 +34,7 @@ pub(in crate::identify) struct ReadAs {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::identify) enum Misplaced {
     /// Two coordinates of the position stand in each other's column.
-    Columns(usize, usize),
+    Columns(Exchanged),
     /// Every pose stands one row off: that of a stop in the row below, or above.
     Rows {
         /// True for the row below.
@@ -54,7 +55,7 @@ impl ReadAs {
 
     /// All ways with numbers in the wrong place. Whether poses are reached tells nothing of them: every one is, or its neighbour.
     fn misplaced() -> impl Iterator<Item = Self> {
-        let columns = [(0, 1), (0, 2), (1, 2)].map(|(a, b)| Misplaced::Columns(a, b));
+        let columns = Exchanged::ALL.map(Misplaced::Columns);
         let rows = [true, false].map(|below| Misplaced::Rows { below });
         columns.into_iter().chain(rows).map(|misplaced| Self { misplaced: Some(misplaced), ..Self::WRITTEN })
     }
@@ -67,10 +68,7 @@ impl ReadAs {
         let of = |row: Option<usize>| read.get(row?)?.as_ref().map(in_metres);
         let at = |row: usize| match self.misplaced {
             None => of(Some(row)),
-            Some(Misplaced::Columns(a, b)) => of(Some(row)).map(|mut pose| {
-                pose.translation.swap_rows(a, b);
-                pose
-            }),
+            Some(Misplaced::Columns(exchanged)) => of(Some(row)).map(|pose| exchanged.undone(pose)),
             Some(Misplaced::Rows { below: true }) => of(Some(row + 1)),
             Some(Misplaced::Rows { below: false }) => of(row.checked_sub(1)),
         };

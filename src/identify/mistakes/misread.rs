@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::angles_misread::AnglesMisread;
+use super::exchanged::Exchanged;
 use crate::diagnose::MistakeKind;
 use crate::error::Code;
 use crate::geom::Pose;
@@ -14,6 +15,8 @@ use crate::series::{LENGTH_UNITS, LengthUnit};
 pub(in crate::identify) enum Misread {
     /// Positions are in this unit and not in metres.
     InUnit(&'static LengthUnit),
+    /// Two coordinates stand in each other's column, and the rotations as they should.
+    InColumns(Exchanged),
     /// Rotations were made of angles of another convention.
     OfAngles(AnglesMisread),
     /// Another.
@@ -31,12 +34,14 @@ pub(in crate::identify) struct Otherwise {
 
 /// All of them.
 pub(in crate::identify) fn all_misread() -> impl Iterator<Item = Misread> {
+    let in_units = LENGTH_UNITS.iter().map(Misread::InUnit);
+    let in_columns = Exchanged::ALL.into_iter().map(Misread::InColumns);
     let of_angles = AnglesMisread::all().map(Misread::OfAngles);
-    LENGTH_UNITS.iter().map(Misread::InUnit).chain(OF_AXES.iter().map(Misread::Otherwise)).chain(of_angles)
+    in_units.chain(OF_AXES.iter().map(Misread::Otherwise)).chain(in_columns).chain(of_angles)
 }
 
 /// Those of axes, of rotations and of what is seen from where.
-const OF_AXES: [Otherwise; 10] = [
+const OF_AXES: [Otherwise; 7] = [
     Otherwise {
         code: Code::AxesMirrored,
         what: "its axes are left-handed: with y_m negated the measurements fit",
@@ -65,24 +70,6 @@ const OF_AXES: [Otherwise; 10] = [
                 Pose::from_xyz_quaternion(mirrored(pose.translation, 1).into(), [-x, y, -z, w])
             })
         },
-    },
-    Otherwise {
-        code: Code::AxesMirrored,
-        what: "x_m and y_m stand in each other's column, and the rotations as they should: exchanged, the measurements fit",
-        remedy: "exchange the columns x_m and y_m",
-        undone: |seen| of_pose(seen, |pose| Pose::new(pose.rotation, exchanged(pose.translation, 0, 1))),
-    },
-    Otherwise {
-        code: Code::AxesMirrored,
-        what: "x_m and z_m stand in each other's column, and the rotations as they should: exchanged, the measurements fit",
-        remedy: "exchange the columns x_m and z_m",
-        undone: |seen| of_pose(seen, |pose| Pose::new(pose.rotation, exchanged(pose.translation, 0, 2))),
-    },
-    Otherwise {
-        code: Code::AxesMirrored,
-        what: "y_m and z_m stand in each other's column, and the rotations as they should: exchanged, the measurements fit",
-        remedy: "exchange the columns y_m and z_m",
-        undone: |seen| of_pose(seen, |pose| Pose::new(pose.rotation, exchanged(pose.translation, 1, 2))),
     },
     Otherwise {
         code: Code::RotationConvention,
@@ -114,6 +101,7 @@ impl Misread {
     pub fn undone(self, seen: BodySeen) -> Option<BodySeen> {
         match self {
             Self::InUnit(unit) => Some(moved(seen, |pose| Pose::new(pose.rotation, unit.metres * pose.translation))),
+            Self::InColumns(exchanged) => of_pose(seen, |pose| exchanged.undone(pose)),
             Self::OfAngles(angles) => of_pose(seen, |pose| Pose::new(angles.undone(&pose.rotation), pose.translation)),
             Self::Otherwise(other) => (other.undone)(seen),
         }
@@ -123,6 +111,14 @@ impl Misread {
     pub fn kind(self) -> MistakeKind {
         match self {
             Self::InUnit(unit) => MistakeKind::MeasuredUnit(*unit),
+            Self::InColumns(exchanged) => MistakeKind::Poses {
+                code: Code::AxesMirrored,
+                what: format!(
+                    "{}, and the rotations as they should: exchanged, the measurements fit",
+                    exchanged.what()
+                ),
+                remedy: exchanged.remedy(),
+            },
             Self::OfAngles(angles) => MistakeKind::Poses {
                 code: Code::RotationConvention,
                 what: format!("{}: made so, the measurements fit", angles.what()),
@@ -137,11 +133,6 @@ impl Misread {
 
 fn mirrored(mut position: Vector3<f64>, axis: usize) -> Vector3<f64> {
     position[axis] = -position[axis];
-    position
-}
-
-fn exchanged(mut position: Vector3<f64>, a: usize, b: usize) -> Vector3<f64> {
-    position.swap_rows(a, b);
     position
 }
 

@@ -1,10 +1,11 @@
 //! When what was read and what was seen do not fit: which usual mistake explains it.
 //!
-//! `readings`, `name_order`, `misread` and `angles_misread` undo mistakes of readings and of places; `suspects`, `mounting`, `row_shift` and `breaks` try them on
+//! `readings`, `name_order`, `misread`, `exchanged` and `angles_misread` undo mistakes of readings and of places; `suspects`, `mounting`, `row_shift` and `breaks` try them on
 //! images, in whole series and in parts; of several that explain it `likeliest` names one.
 
 mod angles_misread;
 pub(super) mod breaks;
+pub(super) mod exchanged;
 pub(super) mod likeliest;
 pub(super) mod misread;
 mod mounting;

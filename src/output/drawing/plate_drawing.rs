@@ -54,11 +54,10 @@ pub(super) fn figures(plate: &Plate, caption: &Caption) -> Vec<Figure> {
     let half = [caption.sheet.width_m / 2.0, caption.sheet.height_m / 2.0];
     axes(quiet, half, &mut all);
     let bottom = -quiet[1];
-    let lattice = format!("{} x {}, pitch {:.1} mm", plate.columns, plate.rows, plate.pitch_m * 1e3);
     let line = |k: f64| [0.0, bottom - TEXT_BELOW - k * 1.5 * TEXT];
     let tens = bar_tens(half[0]);
     scale_bar(bottom - BAR_BELOW, tens, &mut all);
-    ruled_text(line(0.0), half[0], &format!("{}. {lattice}.", caption.name), &mut all);
+    ruled_text(line(0.0), half[0], &format!("{}.", caption.name), &mut all);
     ruled_text(line(1.0), half[0], &advice(&caption.sheet, tens), &mut all);
     all
 }
