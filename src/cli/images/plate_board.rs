@@ -242,12 +242,12 @@ fn kind_name(kind: Kind) -> String {
 }
 
 fn name(args: &BoardArgs, plate: &Plate) -> String {
-    let kind = kind_name(args.kind);
+    let size = format!("{} {}x{}", kind_name(args.kind), plate.columns, plate.rows);
+    // A single tag has none.
+    let lattice = if plate.pitch_m > 0.0 { format!("{size}, pitch {:.2} mm", plate.pitch_m * 1e3) } else { size };
     match &plate.tags {
-        Some(tags) => {
-            format!("{kind} {}x{}, {}, side {:.2} mm", plate.columns, plate.rows, tags.dictionary, tags.side_m * 1e3)
-        }
-        None => format!("{kind} {}x{}, pitch {:.2} mm", plate.columns, plate.rows, plate.pitch_m * 1e3),
+        Some(tags) => format!("{lattice}, {}, side {:.2} mm", tags.dictionary, tags.side_m * 1e3),
+        None => lattice,
     }
 }
 
