@@ -33,7 +33,7 @@ pub struct PointFit {
 }
 
 /// Unknowns of frame and reflector.
-pub(super) const FITTED: usize = 9;
+const FITTED: usize = 9;
 
 /// Share of their mean by which the normal equations are held where the points do not determine frame and reflector.
 const HELD: f64 = 1e-9;

@@ -3,9 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6, Vector3, Vector6};
 
 use super::Limits;
-use super::points::{
-    Derivatives, FITTED, MeasuredPoint, PointFit, by_frame_and_reflector, fit_points, freedom, held_weakly,
-};
+use super::points::{Derivatives, MeasuredPoint, PointFit, by_frame_and_reflector, fit_points, freedom, held_weakly};
 use super::statistics::log_chance;
 use super::usual_errors::usual_errors;
 use crate::linalg::{SymmetricFactor, median};
