@@ -4,6 +4,7 @@
 use serde::Serialize;
 
 use crate::problem::Bounds;
+use crate::solve::FEWEST_MARKER_COORDINATES;
 
 /// A limit, to be set.
 pub(super) enum LimitMut<'a> {
@@ -155,6 +156,8 @@ limits! {
 
     /// Fewest images on either side of a displacement: six parameters need more than one image.
     displaced_images: usize = 3;
+    /// Changes between two places from which they are taken by turns: more than of a move, or of one to and fro with a wrong image or two in between.
+    place_changes: usize = 6;
     /// Share of the squares of the joint noise that a displacement must explain: real robots err alike in postures that are alike.
     displaced_share: f64 = 0.6;
     /// Share from which it is named as a doubt: image noise has its part of the squares, too.
@@ -179,7 +182,7 @@ limits! {
     /// Share of what the best pattern removes from which a simpler one names the cause: the rest is of second order.
     pattern_share: f64 = 0.8;
     /// Fewest coordinates of markers that the data must tell before they are compared with their tolerance: its size is then known to a tenth.
-    tolerance_coordinates: f64 = 50.0;
+    tolerance_coordinates: f64 = FEWEST_MARKER_COORDINATES;
 
     /// Factor on the stated sigma of a tracker or of contacts from which it is said: sigmas are believed to a factor of two.
     doubtful_measurement_factor: f64 = 3.0;

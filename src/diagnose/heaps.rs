@@ -2,7 +2,6 @@
 
 use nalgebra::Vector6;
 
-use super::left_out::moved::CHANGES;
 use crate::assess::Limits;
 use crate::fit::Fit;
 use crate::geom::Pose;
@@ -132,7 +131,7 @@ impl Heaps {
             _ => two.distance > limits.displaced_rad,
         };
         self.split(0..6, limits)
-            .filter(|two| matters(two) && two.share > limits.displaced_share && two.changes >= CHANGES)
+            .filter(|two| matters(two) && two.share > limits.displaced_share && two.changes >= limits.place_changes)
     }
 }
 

@@ -204,6 +204,11 @@ impl Problem {
         self.body_measurements.iter().enumerate().filter(|(_, measured)| measured.rejected.is_none())
     }
 
+    /// True where an image or a measurement of a body takes part at a stop.
+    pub fn is_measured_at(&self, stop: usize) -> bool {
+        self.used().any(|(_, image)| image.stop == stop) || self.used_bodies().any(|(_, body)| body.stop == stop)
+    }
+
     /// Measured distances between places or bodies that take part, with their indices.
     pub fn used_lengths(&self) -> impl Iterator<Item = (usize, &MeasuredLength)> {
         self.lengths.iter().enumerate().filter(|(_, length)| !length.left_out)

@@ -132,8 +132,8 @@ impl Stops {
     /// What is to be said of their order and their times.
     pub(super) fn order_notice(&self, table: &Path) -> Option<Notice> {
         let is_untold = matches!(OrderOfTimes::of(&self.stops), OrderOfTimes::Untold);
-        let is_sorted = !self.stops.iter().is_sorted_by_key(|s| s.line);
-        let (code, what, remedy) = match (is_untold, is_sorted) {
+        let was_reordered = !self.stops.iter().is_sorted_by_key(|s| s.line);
+        let (code, what, remedy) = match (is_untold, was_reordered) {
             (false, false) => return None,
             (false, true) => (
                 Code::RowsByTime,

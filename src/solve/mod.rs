@@ -22,8 +22,8 @@ pub use linear::{BodyPart, LinearImage, LinearProblem, LinearStop, Linearised};
 pub use linearised_adjustment::LinearisedAdjustment;
 pub use noise::acceleration::Acceleration;
 pub use noise::components::{
-    ComponentOptions, LEAST_FIRST_GUESS, estimate_components, estimate_components_from_above,
-    estimate_components_judged, estimate_components_near,
+    ComponentOptions, FEWEST_MARKER_COORDINATES, LEAST_FIRST_GUESS, estimate_components,
+    estimate_components_from_above, estimate_components_judged, estimate_components_near,
 };
 pub use noise::information::{NoiseInformation, Spread, noise_information};
 pub use noise::tally::{JOINT_NOISE_FLOOR, Tally, share_out};

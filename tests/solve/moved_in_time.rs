@@ -364,9 +364,10 @@ fn turns_are_told_by_images_that_fit_between() {
             SeenStop { camera_from_plate: mount.camera_from_plate(&others.camera, &tip, &elsewhere), readings, mount }
         };
         let seen: Vec<SeenStop> = images.iter().map(stop).collect();
-        let found = agreement(&state.robot, &others, &seen, &Limits::default()).unwrap();
+        let limits = Limits::default();
+        let found = agreement(&state.robot, &others, &seen, &limits).unwrap();
         assert_eq!(found.members, (0..images.len()).collect::<Vec<usize>>());
-        BodyMoved::of(made, images, found).unwrap().by_turns
+        BodyMoved::of(made, images, found, &limits).unwrap().by_turns
     };
     // Every second image is of the first placement.
     assert!(by_turns(&made, &[0, 4, 8, 12]));

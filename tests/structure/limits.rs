@@ -68,7 +68,6 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("diagnose/computed_postures.rs NAMED", "how many are named"),
     ("diagnose/tool_in_poses.rs NAMED", "how many are named"),
     ("diagnose/left_out/agreement.rs CANDIDATES", "how many are tried"),
-    ("diagnose/left_out/moved.rs CHANGES", "which of two causes is told of what fails either way"),
     ("diagnose/left_out/exchanged_pictures.rs MOST_IMAGES", "how many are named"),
     ("diagnose/left_out/exchanged_readings.rs MOST_STOPS", "how many are named"),
     ("diagnose/steps/place_misstated.rs MOST_STOPS", "how many are named"),

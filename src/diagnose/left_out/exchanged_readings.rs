@@ -32,7 +32,7 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedRe
             continue;
         }
         let of_circle = |i: &&Image| circle.iter().any(|&(k, _)| problem.images[k].stop == i.stop);
-        let is_measured = |&(k, _): &(usize, f64)| others_fit(problem, problem.images[k].stop);
+        let is_measured = |&(k, _): &(usize, f64)| problem.is_measured_at(problem.images[k].stop);
         found.push(ExchangedReadings {
             others_fit: circle.iter().all(is_measured),
             circle: circle.iter().map(|&(i, _)| problem.images[i].name.clone()).collect(),
@@ -42,11 +42,6 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedRe
         });
     }
     found
-}
-
-/// True where an image or a measurement of a body is in use at a stop.
-fn others_fit(problem: &Problem, stop: usize) -> bool {
-    problem.used().any(|(_, image)| image.stop == stop) || problem.used_bodies().any(|(_, m)| m.stop == stop)
 }
 
 /// Wrongly paired images from one to the one whose readings it fits, with how well, until the first is met again.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::agreement::{Agreement, Moved, agreement};
+use crate::assess::Limits;
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, some_of};
 use crate::error::Code;
 use crate::init::{HandEye, SeenStop};
@@ -24,9 +25,6 @@ pub struct BodyMoved {
     pub by_turns: bool,
 }
 
-/// Changes between the two places beyond that of a move, or of one to and fro with a wrong image or two in between.
-pub const CHANGES: usize = 6;
-
 /// What the wrongly paired images of a series agree on, for each mounting and placement.
 pub fn check(Adjustment { problem, state }: &Adjustment, setting: &CheckContext) -> Vec<BodyMoved> {
     let mut groups: BTreeMap<[usize; 3], Vec<(usize, SeenStop)>> = BTreeMap::new();
@@ -42,13 +40,13 @@ pub fn check(Adjustment { problem, state }: &Adjustment, setting: &CheckContext)
         let others = HandEye { camera: state.mountings[mounting], plate: state.placements[placement] };
         let (images, seen): (Vec<usize>, Vec<SeenStop>) = wrong.into_iter().unzip();
         let found = agreement(&state.robot, &others, &seen, setting.limits)?;
-        BodyMoved::of(problem, &images, found)
+        BodyMoved::of(problem, &images, found, setting.limits)
     };
     groups.into_iter().filter_map(moved).collect()
 }
 
-/// Whether images of the same mounting and placement that fit stand between the members, again and again.
-fn stand_between(problem: &Problem, members: &[usize]) -> bool {
+/// Whether images of the same mounting and placement that fit stand between the members, with so many changes from the one to the other.
+fn stand_between(problem: &Problem, members: &[usize], changes: usize) -> bool {
     let (Some(&from), Some(&to)) = (members.first(), members.last()) else { return false };
     let group = |i: usize| {
         let image = &problem.images[i];
@@ -60,12 +58,12 @@ fn stand_between(problem: &Problem, members: &[usize]) -> bool {
         (is_member || problem.images[i].rejected.is_none()).then_some(is_member)
     });
     let is_member: Vec<bool> = is_member.collect();
-    is_member.windows(2).filter(|two| two[0] != two[1]).count() >= CHANGES
+    is_member.windows(2).filter(|two| two[0] != two[1]).count() >= changes
 }
 
 impl BodyMoved {
     /// What some `images`, by their index, agree on.
-    pub fn of(problem: &Problem, images: &[usize], found: Agreement) -> Option<Self> {
+    pub fn of(problem: &Problem, images: &[usize], found: Agreement, limits: &Limits) -> Option<Self> {
         let images: Vec<usize> = found.members.iter().map(|&k| images[k]).collect();
         let (from, to) = (*images.first()?, *images.last()?);
         let own = |i: &usize| problem.images[*i].series == problem.images[from].series;
@@ -73,7 +71,7 @@ impl BodyMoved {
         let (early, late) = if neighbour > to { (to, neighbour) } else { (neighbour, from) };
         let name = |i: usize| problem.images[i].name.clone();
         let between = [name(early), name(late)];
-        let by_turns = stand_between(problem, &images);
+        let by_turns = stand_between(problem, &images, limits.place_changes);
         Some(Self { moved: found.moved, between, images: images.into_iter().map(name).collect(), by_turns })
     }
 }

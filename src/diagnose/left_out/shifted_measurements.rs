@@ -6,9 +6,7 @@ use crate::assess::{Limits, best_run};
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::linalg::median;
-use crate::problem::{
-    Adjustment, BodyMeasurement, BodyRejection, BodySeen, InstrumentKind, Problem, TakenFrom, stop_name,
-};
+use crate::problem::{Adjustment, BodyMeasurement, BodyRejection, BodySeen, InstrumentKind, TakenFrom, stop_name};
 
 /// Rows of a tracker that stand beside the readings of a neighbour, and are left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +86,7 @@ impl Group<'_> {
         let shifted: Vec<usize> = rows.clone().filter(|row| fits[*row].is_some()).collect();
         let [first, last] = [*shifted.first()?, *shifted.last()?].map(|row| self.measured(row));
         let name = |measured: &BodyMeasurement| stop_name(setting.series, measured.read);
-        let is_seen = |row: &usize| others_fit(problem, self.measured(*row).stop);
+        let is_seen = |row: &usize| problem.is_measured_at(self.measured(*row).stop);
         (shifted.len() >= limits.moved_images).then(|| ShiftedMeasurements {
             of: [setting.series[first.read.0].name.clone(), problem.instruments[first.instrument].name.clone()],
             stops: [first, last].map(name),
@@ -115,11 +113,6 @@ impl Group<'_> {
         let (own, as_other) = (self.misfit(row, measured.stop)?, self.misfit(row, other)?);
         (as_other < usual + limits.other_readings_explain * own).then_some(as_other)
     }
-}
-
-/// True where an image or a measurement of a body is in use at a stop.
-fn others_fit(problem: &Problem, stop: usize) -> bool {
-    problem.used().any(|(_, image)| image.stop == stop) || problem.used_bodies().any(|(_, m)| m.stop == stop)
 }
 
 impl ShiftedMeasurements {

@@ -114,11 +114,10 @@ fn framed(adjustment: &Adjustment, instrument: usize, measured: &[usize], limits
         if pairs(&seen).len() < FEWEST_POSES {
             return too_few(problem, instrument, seen.len(), FEWEST_POINTS);
         }
-        let place = format!("tracker {}", problem.instruments[instrument].name);
         let remedy =
             "check the unit, the order of the quaternion (qx, qy, qz, qw) and that the rows belong to these stops";
         let what = "no closed form of the hand-eye transform has a solution";
-        Error::new(Code::ReadingsContradict, place, what, remedy)
+        Error::new(Code::ReadingsContradict, problem.instruments[instrument].place(), what, remedy)
     })
 }
 

@@ -99,7 +99,7 @@ fn finding(suspects: &Suspects, others: &HandEye, some: Range<usize>) -> Option<
         })
         .unzip();
     let found = agreement(suspects.robot, others, &seen, suspects.limits)?;
-    BodyMoved::of(suspects.problem, &images, found)
+    BodyMoved::of(suspects.problem, &images, found, suspects.limits)
 }
 
 #[cfg(test)]

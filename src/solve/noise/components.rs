@@ -48,7 +48,7 @@ const SMALLEST_FACTOR: f64 = 1e-3;
 const FEWEST_DETERMINED: f64 = 1e-6;
 
 /// Coordinates of markers that the data must tell before they decide how far markers are off: the deviation is then known to a tenth.
-const FEWEST_MARKER_COORDINATES: f64 = 50.0;
+pub const FEWEST_MARKER_COORDINATES: f64 = 50.0;
 
 /// Newton decrement between rounds: the components need no better.
 const ROUGH_DECREMENT: f64 = 0.05;
