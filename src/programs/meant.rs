@@ -158,7 +158,7 @@ impl Meaning<'_> {
             TargetKind::Joints(_) => true,
             TargetKind::Pose(pose) => match arrival.posture {
                 MeantPosture::Coded(..) | MeantPosture::Unheeded(..) | MeantPosture::Near(_) => true,
-                MeantPosture::Nearest | MeantPosture::Along => pose.taught.is_some(),
+                MeantPosture::Nearest | MeantPosture::Along | MeantPosture::OnPath => pose.taught.is_some(),
                 MeantPosture::Either(..) => false,
             },
         }

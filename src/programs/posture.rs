@@ -22,6 +22,8 @@ const NEAR: f64 = 0.5;
 const LINE_TURN: f64 = 0.3;
 /// Distance of places on a straight line, m and rad.
 const LINE_STEP: f64 = 0.02;
+/// Part of it to which it is halved where a joint turns quickly, as beside a singular posture.
+const SHORTEST_STEP: f64 = 1.0 / 1024.0;
 /// Most places on a line.
 const LINE_STEPS: f64 = 400.0;
 /// A second posture that is less than so many times as far as the nearest leaves open which is meant.
@@ -44,6 +46,8 @@ pub enum Known {
     Codes,
     /// It goes on along a straight line from the target before.
     Line,
+    /// It goes on along another path of the tool.
+    Path,
     /// It is the one next to that of the target before.
     Before,
     /// It is the one next to `--start`.
@@ -61,6 +65,7 @@ impl Known {
             Self::Taught => "taught",
             Self::Codes => "codes",
             Self::Line => "line",
+            Self::Path => "path",
             Self::Before => "before",
             Self::Start => "start",
             Self::Any => "any",
@@ -90,6 +95,17 @@ pub(super) struct Finder<'a> {
     /// Joints of the last pose with each code.
     by_code: BTreeMap<String, Vec<f64>>,
     rng: ChaCha8Rng,
+}
+
+/// Which of several postures near to a place will do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Choice {
+    /// The nearest, however near others are.
+    Nearest,
+    /// The nearest, where no other is about as near.
+    Clear,
+    /// The same of those that no singular posture parts from the place.
+    Unparted,
 }
 
 type Six<'c> = Option<(&'c Codes, &'c [usize; 6])>;
@@ -122,16 +138,21 @@ pub(super) fn smallest_singular_value(robot: &Robot, q: &[f64], held: &[bool]) -
     gram.max(0.0).sqrt()
 }
 
+/// Sign of the determinant of the Jacobian by six free readings; `None` of other than six. It changes where a singular posture is passed.
+fn side(robot: &Robot, q: &[f64], held: &[bool]) -> Option<bool> {
+    let jacobian = jacobian(robot, q, held);
+    (jacobian.ncols() == 6).then(|| jacobian.fixed_columns::<6>(0).determinant() > 0.0)
+}
+
 /// True where a singular posture lies between two of six free readings: there the determinant of the Jacobian changes its sign.
 pub(super) fn is_parted(robot: &Robot, from: &[f64], to: &[f64], held: &[bool]) -> bool {
-    let sign = |k: usize| {
+    let side_at = |k: usize| {
         let share = k as f64 / BETWEEN as f64;
         let q: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect();
-        let jacobian = jacobian(robot, &q, held);
-        (jacobian.ncols() == 6).then(|| jacobian.fixed_columns::<6>(0).determinant() > 0.0)
+        side(robot, &q, held)
     };
-    let first = sign(0);
-    (1..=BETWEEN).any(|k| sign(k) != first)
+    let first = side_at(0);
+    (1..=BETWEEN).any(|k| side_at(k) != first)
 }
 
 fn unreached(posture: &str) -> Why {
@@ -172,6 +193,16 @@ fn contradicted() -> Why {
     Why::new(LeftReason::PostureUnknown, words)
 }
 
+fn line_not_followed() -> Why {
+    let words = "its posture is not known: the straight line to it passes a singular posture, or leaves the joint limits (move there by the joints, or look at the limits of the description, at tool and work frame)";
+    Why::new(LeftReason::PostureUnknown, words)
+}
+
+fn path_not_followed() -> Why {
+    let words = "its posture is not known: a singular posture parts every one from where the robot comes, which a path of the tool does not pass (move there by the joints, or look at tool and work frame)";
+    Why::new(LeftReason::PostureUnknown, words)
+}
+
 impl<'a> Finder<'a> {
     pub fn new(robot: &'a Robot, limits: &[(f64, f64)], start: Option<&'a [f64]>) -> Self {
         let ranges = inverse::reading_limits(&robot.chain);
@@ -203,13 +234,15 @@ impl<'a> Finder<'a> {
                 by_way(self.by_codes(pose, held, before, (codes, axes)), way, codes)
             }
             (MeantPosture::Near(q), _) => {
-                let found = self.near(pose, held, q, false)?;
+                let found = self.near(pose, held, q, Choice::Clear)?;
                 self.is_beside(pose, q, &found).then_some((found, Known::Near)).ok_or_else(contradicted)
             }
-            (MeantPosture::Nearest | MeantPosture::Along, Some(q)) => {
-                Ok((self.near(pose, held, q, false)?, Known::Taught))
+            (MeantPosture::Nearest | MeantPosture::Along | MeantPosture::OnPath, Some(q)) => {
+                Ok((self.near(pose, held, q, Choice::Clear)?, Known::Taught))
             }
-            (MeantPosture::Nearest | MeantPosture::Along, None) => self.by_approach(pose, held, before),
+            (MeantPosture::Nearest | MeantPosture::Along | MeantPosture::OnPath, None) => {
+                self.by_approach(pose, held, before)
+            }
         }
     }
 
@@ -224,16 +257,18 @@ impl<'a> Finder<'a> {
     /// The posture that goes on from the target before, or the one next to `--start`.
     fn by_approach(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<Posture> {
         let written = pose.joint_fields.iter().any(Option::is_some);
+        let choice = if written { Choice::Nearest } else { Choice::Clear };
         match (before.readings, self.start) {
-            (Some(q), _) => {
-                let along = before.straight && pose.posture == MeantPosture::Along;
-                if let Some(found) = along.then(|| self.along(pose, held, q)).flatten() {
-                    return Ok((found, Known::Line));
-                }
-                Ok((self.near(pose, held, q, written)?, Known::Before))
+            (Some(q), _) if before.straight && pose.posture == MeantPosture::Along => {
+                let found = self.along(pose, held, q).ok_or_else(line_not_followed)?;
+                Ok((found, Known::Line))
             }
-            (None, Some(start)) => Ok((self.near(pose, held, start, written)?, Known::Start)),
-            (None, None) if written => Ok((self.near(pose, held, &self.middle.clone(), true)?, Known::Any)),
+            (Some(q), _) if before.straight && pose.posture == MeantPosture::OnPath => {
+                Ok((self.near(pose, held, q, Choice::Unparted)?, Known::Path))
+            }
+            (Some(q), _) => Ok((self.near(pose, held, q, choice)?, Known::Before)),
+            (None, Some(start)) => Ok((self.near(pose, held, start, choice)?, Known::Start)),
+            (None, None) if written => Ok((self.near(pose, held, &self.middle.clone(), choice)?, Known::Any)),
             (None, None) => {
                 let words =
                     "its posture is not known: nothing tells the joints from which the robot comes (give --start)";
@@ -246,18 +281,25 @@ impl<'a> Finder<'a> {
         q.iter().zip(&pose.fixed).map(|(q, f)| f.unwrap_or(*q)).collect()
     }
 
-    /// The solution next to `q`; where others are about as near it is refused, unless any will do.
-    fn near(&mut self, pose: &PoseTarget, held: &[bool], q: &[f64], any: bool) -> Understood<Vec<f64>> {
+    /// The solution next to `q` of those that will do.
+    fn near(&mut self, pose: &PoseTarget, held: &[bool], q: &[f64], choice: Choice) -> Understood<Vec<f64>> {
         let (wanted, near) = (pose.base_from_flange(), Self::fixed(pose, q));
+        let (robot, of_place) = (self.robot, side(self.robot, &near, held));
+        let will_do = |found: &[f64]| choice != Choice::Unparted || side(robot, found, held) == of_place;
         if let Some(found) = self.solved(&wanted, &near, &near, held, None)
             && farthest(&near, &found) < NEAR
+            && will_do(&found)
         {
             return Ok(found);
         }
         let all = self.postures(&wanted, &near, held);
-        let Some(best) = all.first() else { return Err(unreached("")) };
+        if all.is_empty() {
+            return Err(unreached(""));
+        }
+        let all: Vec<Vec<f64>> = all.into_iter().filter(|found| will_do(found)).collect();
+        let Some(best) = all.first() else { return Err(path_not_followed()) };
         let redundant = held.iter().filter(|h| !**h).count() > 6;
-        let second = all.get(1).filter(|_| !any && !redundant);
+        let second = all.get(1).filter(|_| choice != Choice::Nearest && !redundant);
         match second.filter(|second| farthest(&near, second) < AMBIGUOUS * farthest(&near, best)) {
             None => Ok(best.clone()),
             Some(second) => {
@@ -271,7 +313,8 @@ impl<'a> Finder<'a> {
         }
     }
 
-    /// The solution to which a straight line of the tool leads; `None` where a singular posture or a limit lies on it.
+    /// The solution to which a straight line of the tool leads, in shorter steps where a joint turns quickly; `None` where a singular posture or a limit
+    /// lies on it.
     fn along(&self, pose: &PoseTarget, held: &[bool], q: &[f64]) -> Option<Vec<f64>> {
         let tool = pose.flange_from_tool;
         let (first, last) = (self.robot.base_from_tip(q) * tool, pose.base_from_flange() * tool);
@@ -279,17 +322,22 @@ impl<'a> Finder<'a> {
         let steps = (turn.max(way) / LINE_STEP).ceil().clamp(1.0, LINE_STEPS);
         let between = first.inverse() * last;
         let turned = Pose::new(between.rotation, nalgebra::Vector3::zeros()).log();
-        let mut q = Self::fixed(pose, q);
-        for k in 1..=steps as usize {
-            let share = k as f64 / steps;
+        let place = |share: f64| {
             let mut place = first * Pose::exp(&(turned * share));
             place.translation = first.translation * (1.0 - share) + last.translation * share;
-            let wanted = if k as f64 == steps { last } else { place };
-            let next = self.reach(held).solve_from(&(wanted * tool.inverse()), &q).ok()?;
-            if farthest(&q, &next) > LINE_TURN {
+            if share == 1.0 { last } else { place }
+        };
+        let (mut q, mut share, mut step) = (Self::fixed(pose, q), 0.0, 1.0 / steps);
+        while share < 1.0 {
+            let to = f64::min(share + step, 1.0);
+            let next = self.reach(held).solve_from(&(place(to) * tool.inverse()), &q).ok();
+            if let Some(next) = next.filter(|next| farthest(&q, next) <= LINE_TURN) {
+                (q, share, step) = (next, to, f64::min(2.0 * step, 1.0 / steps));
+            } else if step * steps > SHORTEST_STEP {
+                step *= 0.5;
+            } else {
                 return None;
             }
-            q = next;
         }
         Some(q)
     }

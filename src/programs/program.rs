@@ -318,6 +318,8 @@ pub enum MeantPosture {
     Nearest,
     /// That to which a straight line of the tool from the target before leads.
     Along,
+    /// That to which another path of the tool from the target before leads: no singular posture lies on it.
+    OnPath,
     /// That of the codes where the controller heeds them, else that next to the target before: the text does not tell which.
     Either(Codes, [usize; 6]),
     /// That next to these joint values, rad or m.
@@ -333,7 +335,7 @@ impl MeantPosture {
         match self {
             Self::Unheeded(..) => *self = Self::Along,
             Self::Coded(..) | Self::Either(..) => *self = Self::Nearest,
-            Self::Nearest | Self::Along | Self::Near(_) => {}
+            Self::Nearest | Self::Along | Self::OnPath | Self::Near(_) => {}
         }
     }
 
@@ -341,7 +343,7 @@ impl MeantPosture {
     pub fn codes(&self) -> Option<(&Codes, &[usize; 6])> {
         match self {
             Self::Coded(codes, axes) | Self::Either(codes, axes) | Self::Unheeded(codes, axes) => Some((codes, axes)),
-            Self::Nearest | Self::Along | Self::Near(_) => None,
+            Self::Nearest | Self::Along | Self::OnPath | Self::Near(_) => None,
         }
     }
 }

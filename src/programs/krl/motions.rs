@@ -12,6 +12,8 @@ use crate::programs::scan::Reader;
 
 /// Motions of the joints; the others lead the tool along a path.
 const OF_JOINTS: [&str; 2] = ["PTP", "SPTP"];
+/// Motions that lead it along a straight line.
+const LINES: [&str; 2] = ["LIN", "SLIN"];
 /// Variables of the controller that say where the robot stands.
 const STANDS: [&str; 2] = ["$AXIS_ACT", "$POS_ACT"];
 /// External axes that do not go where a segment of a spline says (KUKA, *Operating and programming instructions for system integrators*).
@@ -22,7 +24,8 @@ const COMPONENTS: usize = 6;
 /// The posture that a motion means: on paths of the tool, status and turn are not heeded.
 fn posture_of(motion: &str, stated: MeantPosture) -> MeantPosture {
     match stated {
-        MeantPosture::Nearest if ["LIN", "SLIN"].contains(&motion) => MeantPosture::Along,
+        MeantPosture::Nearest if LINES.contains(&motion) => MeantPosture::Along,
+        MeantPosture::Nearest if !OF_JOINTS.contains(&motion) => MeantPosture::OnPath,
         MeantPosture::Coded(codes, axes) if !OF_JOINTS.contains(&motion) => MeantPosture::Unheeded(codes, axes),
         stated => stated,
     }

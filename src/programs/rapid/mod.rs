@@ -38,7 +38,7 @@ use super::text_file::TextFile;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::urdf::JointKind;
-use moves::{MoveSwitches, is_of_joints, is_to_joints};
+use moves::{MoveSwitches, TWO_POINTS, is_of_joints, is_to_joints, targets_of};
 use scopes::Scopes;
 use switched::Watched;
 use switching::{Now, Switching};
@@ -285,7 +285,11 @@ impl Task<'_> {
                 "axis 4 is locked, or may be (SingArea\\LockAxis4): the tool turns as it can, whatever the target says";
             return Err(Why::new(LeftReason::OrientationKept, words));
         }
-        let near = if upper.starts_with("MOVEL") { MeantPosture::Along } else { MeantPosture::Nearest };
+        let near = match targets_of(&upper) {
+            _ if is_of_joints(&upper) => MeantPosture::Nearest,
+            Some(targets) if targets.count == TWO_POINTS => MeantPosture::OnPath,
+            _ => MeantPosture::Along,
+        };
         pose.posture = match (*self.switching.now().watched[usize::from(!is_of_joints(&upper))].value(), pose.posture) {
             (Watched::Off, _) => near,
             (Watched::Unknown, MeantPosture::Coded(codes, axes)) => MeantPosture::Either(codes, axes),

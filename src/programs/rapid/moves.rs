@@ -21,8 +21,10 @@ pub(super) struct MoveSwitches {
 
 /// The first argument.
 const ONE: Targets = Targets { skipped: 0, count: 1 };
+/// Targets of a move on a circle.
+pub(super) const TWO_POINTS: usize = 2;
 /// The point on a circle, and its end.
-const TWO: Targets = Targets { skipped: 0, count: 2 };
+const TWO: Targets = Targets { skipped: 0, count: TWO_POINTS };
 /// Behind a signal and the point that is found.
 const BEHIND_FOUND: usize = 2;
 

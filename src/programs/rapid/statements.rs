@@ -1,7 +1,7 @@
 //! Statements of RAPID: where each begins and ends, and which of them move.
 
 use super::Task;
-use super::moves::{MoveSwitches, Targets, targets_of};
+use super::moves::{MoveSwitches, TWO_POINTS, Targets, targets_of};
 use super::switching::{ROUTINES, words_before_name};
 use super::value::{Node, TYPES, node};
 use crate::error::{Code, Error, Result};
@@ -45,8 +45,6 @@ const LED: [&str; 2] = ["CORR", "TRACK"];
 const NO_OFFSET: &str = "NOEOFFS";
 /// Stands before and behind the name of a routine that is called by a text.
 const LATE: u8 = b'%';
-/// Targets of a move on a circle.
-const TWO_POINTS: usize = 2;
 /// Words between two operands.
 pub(super) const OPERATORS: [&str; 6] = ["AND", "OR", "XOR", "NOT", "DIV", "MOD"];
 

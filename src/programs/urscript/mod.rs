@@ -51,7 +51,11 @@ enum Way {
 
 impl Way {
     fn posture(self) -> MeantPosture {
-        if self == Self::Line { MeantPosture::Along } else { MeantPosture::Nearest }
+        match self {
+            Self::Joints => MeantPosture::Nearest,
+            Self::Line => MeantPosture::Along,
+            Self::Arc => MeantPosture::OnPath,
+        }
     }
 }
 
