@@ -157,3 +157,53 @@ fn a_singular_target_is_said_to_be_singular() {
     let (_, reasons) = told(&cell, &[("a.src", krl(&cell, &format!("PTP {pose}\n")))], &[]);
     assert_eq!(reasons, [LeftReason::Singular.name()]);
 }
+
+/// `START` with the wrist elsewhere: axes 4 and 6, and axis 5 itself, rad.
+fn wrist([fourth, fifth, sixth]: [f64; 3]) -> Vec<f64> {
+    let [a, b, c, d, _, f] = START;
+    vec![a, b, c, d + fourth, fifth, f + sixth]
+}
+
+/// The poses of a motion in a corrected module.
+fn poses_of(new: &str, motion: &str) -> Vec<String> {
+    let lines = new.lines().filter(|line| line.starts_with(motion));
+    lines.flat_map(|line| line.split("},").map(str::to_owned).collect::<Vec<_>>()).collect()
+}
+
+/// Turned over, the wrist would be nearer in the joints, but no path of the tool leads there without passing the singular posture.
+#[test]
+fn paths_of_the_tool_keep_the_wrist_on_its_side() {
+    let cell = Cell::kuka(117);
+    let at = |q: &[f64]| krl_pose(&cell, q);
+    for (motion, ends) in [
+        ("CIRC", vec![wrist([2.2, 0.5, -1.8]), wrist([2.5, 0.6, -2.0])]),
+        ("CIRC", vec![wrist([-2.3, 0.6, 1.9]), wrist([-2.5, 0.5, 2.1])]),
+        // Beside the singular posture axis 4 turns by half a turn in a few millimetres.
+        ("LIN", vec![wrist([2.95, 0.5, -2.6])]),
+        ("LIN", vec![wrist([3.05, 0.6, -2.7])]),
+    ] {
+        let (from, to) = (krl_joints(&wrist([0.0, 0.6, 0.0])), ends.iter().map(|q| at(q)).collect::<Vec<_>>());
+        let text = format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {from}\n{motion} {}\nEND\n", to.join(","));
+        let file = cell.write("a.src", text.as_bytes());
+        let new = cell.compensate(&[&file], &["--unordered"]).expect(0).text("a.src");
+        let written = poses_of(&new, motion);
+        assert_eq!(written.len(), ends.len(), "{new}");
+        for (pose, q) in written.iter().zip(&ends) {
+            assert_brings_to(&cell, &krl_frame(pose), q, pose);
+        }
+    }
+}
+
+/// A straight line through the base is none that the robot can go: what the joints would be at its end, nobody knows.
+#[test]
+fn a_line_that_cannot_be_followed_leaves_its_target() {
+    let cell = Cell::kuka(118);
+    let [_, b, c, d, e, f] = START;
+    let at = |turn: f64| vec![turn, b, c, d, e, f];
+    let text = |motion: &str| {
+        let (from, to) = (krl_joints(&at(-1.6)), krl_pose(&cell, &at(1.6)));
+        format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {from}\n{motion} {to}\nEND\n")
+    };
+    assert_eq!(told(&cell, &[("a.src", text("LIN"))], &[]), (1, unknown(1)));
+    assert_eq!(told(&cell, &[("a.src", text("PTP"))], &[]), (2, Vec::new()));
+}
