@@ -14,14 +14,14 @@ const COVARIANCE: [&str; 3] = ["cov_uu", "cov_uv", "cov_vv"];
 
 /// Reads the observations of every image, by image name. Rows that the program itself left out (a `reason`) are skipped.
 ///
-/// `size_px` is the image size where it is known.
+/// `size_px` is the size of an image, by its name, where it is known: cameras of several sizes may share a table.
 ///
 /// # Errors
 /// By line: unknown markers, an inner edge of a disc, numbers that are none, points outside the image, doubles.
 pub(super) fn read(
     path: &Path,
     plate: &Plate,
-    size_px: Option<(u32, u32)>,
+    size_px: &dyn Fn(&str) -> Option<(u32, u32)>,
     inputs: &mut Vec<InputFile>,
 ) -> Result<BTreeMap<String, ImageObservations>> {
     from_table(&Table::read(path, inputs)?, plate, size_px)
@@ -37,13 +37,13 @@ pub fn parse_observations(
     plate: &Plate,
     size_px: Option<(u32, u32)>,
 ) -> Result<BTreeMap<String, ImageObservations>> {
-    from_table(&Table::parse(path, text)?, plate, size_px)
+    from_table(&Table::parse(path, text)?, plate, &|_| size_px)
 }
 
 fn from_table(
     table: &Table,
     plate: &Plate,
-    size_px: Option<(u32, u32)>,
+    size_px: &dyn Fn(&str) -> Option<(u32, u32)>,
 ) -> Result<BTreeMap<String, ImageObservations>> {
     table.refuse_unknown(&KNOWN)?;
     let reader = Reader::new(table, plate, size_px)?;
@@ -78,7 +78,7 @@ fn from_table(
 struct Reader<'a> {
     table: &'a Table,
     plate: &'a Plate,
-    size_px: Option<(u32, u32)>,
+    size_px: &'a dyn Fn(&str) -> Option<(u32, u32)>,
     image: usize,
     marker: usize,
     uv: [usize; 2],
@@ -88,7 +88,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn new(table: &'a Table, plate: &'a Plate, size_px: Option<(u32, u32)>) -> Result<Self> {
+    fn new(table: &'a Table, plate: &'a Plate, size_px: &'a dyn Fn(&str) -> Option<(u32, u32)>) -> Result<Self> {
         let covariance = match COVARIANCE.map(|name| table.column(name)) {
             [None, None, None] => None,
             _ => {
@@ -145,7 +145,7 @@ impl<'a> Reader<'a> {
 
     fn point(&self, row: Row<'_>) -> Result<[f64; 2]> {
         let uv = [self.table.number(row, self.uv[0])?, self.table.number(row, self.uv[1])?];
-        let Some((width, height)) = self.size_px else { return Ok(uv) };
+        let Some((width, height)) = (self.size_px)(row.cell(self.image)) else { return Ok(uv) };
         for (column, value, size) in [(self.uv[0], uv[0], width), (self.uv[1], uv[1], height)] {
             if !is_inside(value, size) {
                 let (what, remedy) = match self.fits_exchanged((width, height)) {
@@ -166,10 +166,11 @@ impl<'a> Reader<'a> {
         Ok(uv)
     }
 
-    /// Whether all points are in the image where u is taken for v.
-    fn fits_exchanged(&self, (width, height): (u32, u32)) -> bool {
+    /// Whether all points of images of this size are in the image where u is taken for v.
+    fn fits_exchanged(&self, size: (u32, u32)) -> bool {
         let within = |row, column, size| self.table.number(row, column).is_ok_and(|value| is_inside(value, size));
-        self.table.rows().all(|row| within(row, self.uv[1], width) && within(row, self.uv[0], height))
+        let mut alike = self.table.rows().filter(|row| (self.size_px)(row.cell(self.image)) == Some(size));
+        alike.all(|row| within(row, self.uv[1], size.0) && within(row, self.uv[0], size.1))
     }
 
     fn covariance(&self, row: Row<'_>) -> Result<Option<[f64; 3]>> {

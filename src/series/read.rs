@@ -274,8 +274,9 @@ fn observed(
     inputs: &mut Vec<InputFile>,
     notices: &mut Vec<Notice>,
 ) -> Result<Source> {
-    let size = manifest.camera().size_px();
-    let images = observation_file::read(path, plate, size, inputs)?;
+    let own: BTreeSet<&str> = stops.stops.iter().map(|s| s.image.as_str()).collect();
+    let size = |image: &str| manifest.camera().size_px().filter(|_| own.contains(image));
+    let images = observation_file::read(path, plate, &size, inputs)?;
     let (ordered, strange) = observation_file::in_order(images, stops.stops.iter().map(|s| s.image.as_str()));
     let table = controller_file::table_of_stops(path.parent().unwrap_or(path));
     observation_file::require_some(path, table, &ordered)?;

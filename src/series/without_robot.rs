@@ -39,7 +39,7 @@ pub fn read_without_robot(folder: &Path) -> Result<Series> {
     let observed = folder.join("observations.csv");
     let (stops, source) = if observed.is_file() {
         let size = manifest.camera().size_px();
-        let images = observation_file::read(&observed, &plate, size, &mut inputs)?;
+        let images = observation_file::read(&observed, &plate, &|_| size, &mut inputs)?;
         (
             images.keys().map(|image| stop(image.clone(), None)).collect(),
             Source::Observations(images.into_values().collect()),

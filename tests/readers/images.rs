@@ -117,3 +117,19 @@ fn observations_name_images_of_one_camera_alone() {
     let error = refusal("observations.csv", text);
     assert_says(&error, Code::CsvRowTwice, &["images.csv", "\"a.png\""]);
 }
+
+#[test]
+fn points_lie_within_the_image_of_their_own_camera() {
+    let manifest = MANIFEST
+        .replace("mount = \"fixed\"\n", "mount = \"fixed\"\nwidth_px = 1280\nheight_px = 1024\n")
+        .replace("mount = \"hand\"\n", "mount = \"hand\"\nwidth_px = 640\nheight_px = 480\n");
+    let images = "stop,camera,image\none,left,a.png\none,wrist,b1.png\ntwo,wrist,b2.png\n";
+    let with = |text: &str| {
+        let files = [("series.toml", &*manifest), ("images.csv", images), ("observations.csv", text)];
+        read(folder(&files).path())
+    };
+    let series = with("image,marker,u,v\na.png,0,1000,900\nb1.png,0,600,20\n").unwrap();
+    assert_eq!(series.views().iter().map(|view| view.stops.stops.len()).collect::<Vec<_>>(), [1, 2]);
+    let error = with("image,marker,u,v\na.png,0,1000,900\nb1.png,0,700,20\n").unwrap_err();
+    assert_says(&error, Code::CsvRange, &["observations.csv:3", "640 x 480"]);
+}
