@@ -259,10 +259,10 @@ impl<'a> Finder<'a> {
         let written = pose.joint_fields.iter().any(Option::is_some);
         let choice = if written { Choice::Nearest } else { Choice::Clear };
         match (before.readings, self.start) {
-            (Some(q), _) if before.straight && pose.posture == MeantPosture::Along => {
-                let found = self.along(pose, held, q).ok_or_else(line_not_followed)?;
-                Ok((found, Known::Line))
-            }
+            (Some(q), _) if before.straight && pose.posture == MeantPosture::Along => match self.along(pose, held, q) {
+                Some(found) => Ok((found, Known::Line)),
+                None => Err(self.near(pose, held, q, Choice::Nearest).err().unwrap_or_else(line_not_followed)),
+            },
             (Some(q), _) if before.straight && pose.posture == MeantPosture::OnPath => {
                 Ok((self.near(pose, held, q, Choice::Unparted)?, Known::Path))
             }

@@ -179,8 +179,8 @@ fn paths_of_the_tool_keep_the_wrist_on_its_side() {
         ("CIRC", vec![wrist([2.2, 0.5, -1.8]), wrist([2.5, 0.6, -2.0])]),
         ("CIRC", vec![wrist([-2.3, 0.6, 1.9]), wrist([-2.5, 0.5, 2.1])]),
         // Beside the singular posture axis 4 turns by half a turn in a few millimetres.
-        ("LIN", vec![wrist([2.95, 0.5, -2.6])]),
-        ("LIN", vec![wrist([3.05, 0.6, -2.7])]),
+        ("LIN", vec![wrist([-2.95, 0.6, 2.9])]),
+        ("LIN", vec![wrist([-3.05, 0.5, 3.05])]),
     ] {
         let (from, to) = (krl_joints(&wrist([0.0, 0.6, 0.0])), ends.iter().map(|q| at(q)).collect::<Vec<_>>());
         let text = format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {from}\n{motion} {}\nEND\n", to.join(","));
@@ -200,10 +200,10 @@ fn a_line_that_cannot_be_followed_leaves_its_target() {
     let cell = Cell::kuka(118);
     let [_, b, c, d, e, f] = START;
     let at = |turn: f64| vec![turn, b, c, d, e, f];
-    let text = |motion: &str| {
-        let (from, to) = (krl_joints(&at(-1.6)), krl_pose(&cell, &at(1.6)));
-        format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {from}\n{motion} {to}\nEND\n")
+    let text = |turn: f64| {
+        let (from, to) = (krl_joints(&at(-turn)), krl_pose(&cell, &at(turn)));
+        format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {from}\nLIN {to}\nEND\n")
     };
-    assert_eq!(told(&cell, &[("a.src", text("LIN"))], &[]), (1, unknown(1)));
-    assert_eq!(told(&cell, &[("a.src", text("PTP"))], &[]), (2, Vec::new()));
+    assert_eq!(told(&cell, &[("a.src", text(1.6))], &[]), (1, unknown(1)));
+    assert_eq!(told(&cell, &[("a.src", text(0.3))], &[]), (2, Vec::new()));
 }
