@@ -83,7 +83,7 @@ impl Judged {
 
 fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     let model = judged(args, (&args.urdf, args.compensation.as_deref()), (file, unit))?;
-    let stated = Stated::beside(&args.urdf, &model.robot);
+    let (stated, of_other) = Stated::beside(&args.urdf, &model.robot)?;
     let limits = &Stated::limits_of(stated.as_ref());
     let device_m = point_sigma(args.point_sigma_m, limits)?;
     let zeros = args.readings.beside(stated.as_ref(), &args.urdf, &[])?;
@@ -133,6 +133,7 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
         }
     }
     let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
+    reasons.findings.extend(of_other);
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     Ok(reasons.verdict())
 }

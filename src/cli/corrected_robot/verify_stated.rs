@@ -5,12 +5,15 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, Vector3, Vector6};
 
-use super::compensate_frames::{Side, part, solution};
+use super::compensate_frames::{NoSolution, Side, part, solution};
 use crate::assess::{
     Limits, MeasuredPoint, NORMAL_95, PredictedFlange, by_readings, fit_points, most_of_sum, root_mean_square,
 };
+use crate::diagnose::Weight;
+use crate::error::{Error, Result};
 use crate::model::joint_terms::Term;
 use crate::model::robot::{Posture, Robot};
+use crate::output::corrections::FileFinding;
 use crate::output::restore::{FoundModel, exported_model, measured_series};
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::problem::{Exposures, MeasuredSeries};
@@ -50,14 +53,22 @@ const FITTED: f64 = 9.0;
 const FLAT_FIELD: [&str; 2] = ["dark", "white"];
 
 impl Stated {
-    /// That of the solution.json beside a description; `None` where none stands there from which it came.
-    pub fn beside(urdf: &Path, robot: &Robot) -> Option<Self> {
+    /// That of the solution.json beside a description; where that is of another one, a note that says so.
+    ///
+    /// # Errors
+    /// One that stands there and cannot be used: without it the description would be judged by less.
+    pub fn beside(urdf: &Path, robot: &Robot) -> Result<(Option<Self>, Option<FileFinding>)> {
         let path = urdf.with_file_name(solution_json::FILE_NAME);
         let side = Side { robot, urdf, solution: None };
-        let record = solution(&side, None).ok()?.ok()?;
-        let found = exported_model(&record).ok()?;
+        let record = match solution(&side, None)? {
+            Ok(record) => record,
+            Err(NoSolution::Absent(_)) => return Ok((None, None)),
+            Err(NoSolution::OfOther(error)) => return Ok((None, Some(not_judged_by(urdf, &error)))),
+            Err(NoSolution::Unusable(error)) => return Err(error),
+        };
+        let found = exported_model(&record)?;
         let part = part(&record, robot).cloned();
-        Some(Self { path, record, found, part })
+        Ok((Some(Self { path, record, found, part }), None))
     }
 
     /// Those with which the solution was judged; where none stands beside a description, the usual ones.
@@ -186,6 +197,13 @@ impl Stated {
     pub fn record(&self) -> &SolutionRecord {
         &self.record
     }
+}
+
+/// What a solution of another description states is not held against this one.
+fn not_judged_by(urdf: &Path, error: &Error) -> FileFinding {
+    let Error { code, place, what, remedy, .. } = error;
+    let text = format!("{place} {what}: this robot is not held against what a solution states; {remedy}");
+    FileFinding::new(*code, Weight::Note, urdf.display(), [], text)
 }
 
 fn has_exposure_of(fitted: &[MeasuredSeries], series: &[MeasuredSeries]) -> bool {

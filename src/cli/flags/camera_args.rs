@@ -1,5 +1,6 @@
 //! Which cameras an adjustment begins with: a lens by name, or the camera file of another program.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -56,8 +57,8 @@ impl CameraArgs {
     }
 
     fn take(&self, given: &str, series: &mut [MeasuredSeries]) -> Result<Option<Notice>> {
-        let mut names: Vec<String> = series.iter().filter(|s| s.has_images).map(|s| s.camera.clone()).collect();
-        names.dedup();
+        let names: BTreeSet<&str> = series.iter().filter(|s| s.has_images).map(|s| s.camera.as_str()).collect();
+        let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
         let (name, path) = match given.split_once('=') {
             Some((name, path)) if names.iter().any(|n| n == name) => (name.to_owned(), PathBuf::from(path)),
             _ => match &names[..] {
