@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use crate::cli::flags::joint_table::{Unit, read_vectors};
 use crate::error::{Code, Error, Result};
 use crate::model::robot::Robot;
 use crate::plan::share_left;
-use crate::series::{Row, Table};
-use crate::urdf::{Chain, JointKind};
+use crate::urdf::Chain;
 
 /// Fewest targets whose error says something: the nine numbers of the frames take up less than a third of theirs.
 const LEAST_TARGETS: usize = 10;
@@ -15,29 +15,12 @@ const LEAST_TARGETS: usize = 10;
 /// Share of the mean squared error that the frames must leave: less is a hundredth of the error.
 const LEAST_SHARE: f64 = 1e-4;
 
-/// Joint vectors of a file, in degrees (m for prismatic joints), as rad and m in the order of the chain; rows without any are none.
-pub(super) fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
-    let table = Table::read(path, &mut Vec::new())?;
-    let column = |name: &String| {
-        table.column(name).ok_or_else(|| {
-            Error::new(
-                Code::JointMissing,
-                path.display(),
-                format!("has no column \"{name}\""),
-                "name every joint of the chain",
-            )
-        })
-    };
-    let columns: Vec<usize> = chain.readings.iter().map(column).collect::<Result<_>>()?;
-    let in_si = |row: Row<'_>| {
-        let one = |(c, kind): (&usize, &JointKind)| -> Result<f64> {
-            let raw = table.number(row, *c)?;
-            Ok(if *kind == JointKind::Revolute { raw.to_radians() } else { raw })
-        };
-        columns.iter().zip(&chain.reading_kinds).map(one).collect::<Result<Vec<f64>>>()
-    };
-    let rows = table.rows().filter(|row| columns.iter().any(|&c| !row.cell(c).is_empty()));
-    let targets: Vec<Vec<f64>> = rows.map(in_si).collect::<Result<_>>()?;
+/// Flag of the unit.
+const UNIT: &str = "--targets-unit";
+
+/// Joint vectors of a file, in rad and m in the order of the chain; rows without any are none.
+pub(super) fn targets(path: &Path, chain: &Chain, unit: Unit) -> Result<Vec<Vec<f64>>> {
+    let targets = read_vectors(path, chain, (unit, UNIT))?;
     let different: BTreeSet<Vec<u64>> = targets.iter().map(|q| q.iter().map(|v| v.to_bits()).collect()).collect();
     if different.len() < LEAST_TARGETS {
         let what = format!(
@@ -50,8 +33,8 @@ pub(super) fn targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
 }
 
 /// Those at which base frame and a point of the flange leave an error of the robot: of others no measurement there tells one.
-pub(super) fn telling_targets(path: &Path, chain: &Chain) -> Result<Vec<Vec<f64>>> {
-    let targets = targets(path, chain)?;
+pub(super) fn telling_targets(path: &Path, chain: &Chain, unit: Unit) -> Result<Vec<Vec<f64>>> {
+    let targets = targets(path, chain, unit)?;
     if share_left(&Robot::nominal(chain.clone()), &targets) < LEAST_SHARE {
         let what = "the targets are so alike that base frame and a point of the flange, which are brought together there, take up all errors of the robot";
         return Err(too_few(path, what.to_owned()));
