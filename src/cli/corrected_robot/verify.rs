@@ -125,6 +125,10 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
         if nominal.is_some() && gain.is_none() {
             reasons.against.push("the nominal model leaves nothing".into());
         }
+        let expected = match &without {
+            Some(others) => stated.as_ref().and_then(|s| s.at_points(&others.points, device_m)),
+            None => expected,
+        };
         let stated_here = stated.as_ref().zip(expected.map(|expected| expected.all));
         reasons.add(&Measured { urdf: &args.urdf, rms_m, stated: stated_here, gain }, limits);
         if !reasons.is_bad() {
