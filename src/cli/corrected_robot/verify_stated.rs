@@ -16,7 +16,7 @@ use crate::model::robot::{Posture, Robot};
 use crate::output::corrections::FileFinding;
 use crate::output::restore::{FoundModel, exported_model, measured_series};
 use crate::output::solution_json::{self, SolutionRecord};
-use crate::problem::{Exposures, MeasuredSeries};
+use crate::problem::{Exposures, MeasuredSeries, postures_of_stops};
 use crate::series::{InputFile, SpatialFiles};
 
 /// The solution from which a description came, with as much of its model as is judged.
@@ -79,7 +79,7 @@ impl Stated {
     /// At the stops of series: markers as far from the flange as what stands still is.
     pub fn at_stops(&self, series: &[MeasuredSeries]) -> Option<Expectation> {
         let flange = self.found.flange()?;
-        let stops: Vec<Posture> = series.iter().flat_map(postures).collect();
+        let stops: Vec<Posture> = postures_of_stops(series).into_iter().flatten().flatten().collect();
         let at: Vec<PredictedFlange> = stops.iter().map(|stop| flange.at(&stop.readings)).collect();
         let lever_m = |at: &PredictedFlange| at.pose.translation.norm();
         let of_model = at.iter().map(|at| {
@@ -245,14 +245,6 @@ fn displacements(a: &Robot, b: &Robot, stops: &[Posture]) -> Vec<Vector6<f64>> {
     let all: Vec<Vector6<f64>> = stops.iter().map(|stop| (tip(a, stop).inverse() * tip(b, stop)).log()).collect();
     let mean = all.iter().sum::<Vector6<f64>>() / all.len().max(1) as f64;
     all.into_iter().map(|twist| twist - mean).collect()
-}
-
-/// The stops of a series on the robot, in their order.
-fn postures(series: &MeasuredSeries) -> Vec<Posture> {
-    let all: Vec<&Vec<f64>> = series.stops.iter().filter_map(|stop| stop.readings.as_ref()).collect();
-    let step = |k: usize| Some(all[k].iter().zip(all[k.checked_sub(1)?]).map(|(q, before)| q - before).collect());
-    let approach = |k: usize| if series.order_known { step(k) } else { None };
-    (0..all.len()).map(|k| Posture { readings: all[k].clone(), approach: approach(k) }).collect()
 }
 
 fn is_measurement(path: &Path) -> bool {
