@@ -199,6 +199,11 @@ cam1:
         let both = [of("left=FILE#cam1"), of("right=FILE#cam0")];
         assert_eq!(focal_lengths(&both, &["left", "right"]).unwrap(), [800.0, 1100.0]);
         assert_eq!(focal_lengths(&[of("FILE#cam1")], &["front"]).unwrap(), [800.0]);
+        // Of cameras by turns each is named once, too.
+        let by_turns = [of("left=FILE#cam1"), of("right=FILE#cam0")];
+        assert_eq!(focal_lengths(&by_turns, &["left", "right", "left"]).unwrap(), [800.0, 1100.0, 800.0]);
+        let refused = focal_lengths(&[of("FILE#cam1")], &["left", "right", "left"]).unwrap_err();
+        assert_eq!((refused.code, refused.what.matches("left").count()), (Code::OptionRange, 1));
         for given in ["back=FILE#cam1", "back=FILE"] {
             assert_eq!(focal_lengths(&[of(given)], &["front"]).unwrap_err().code, Code::OptionRange);
         }
