@@ -151,8 +151,8 @@ impl IpoMode {
     pub fn named(name: Option<&str>) -> Self {
         match name {
             Some("TCP") => Self::Tcp,
-            Some(_) => Self::Base,
-            None => Self::Untold,
+            Some("BASE" | "NONE") => Self::Base,
+            _ => Self::Untold,
         }
     }
 
