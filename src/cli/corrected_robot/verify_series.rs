@@ -308,3 +308,20 @@ fn line(what: &str, file: &Path, images: &[&JudgedImage]) -> String {
         root_mean_square(&px)
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn why_a_series_cannot_be_fitted_is_said() {
+        let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+        let chain = crate::urdf::read(&urdf).unwrap().chain(None, None).unwrap();
+        let nothing = [MeasuredSeries::without_images("a", true, Vec::new())];
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        let code = identify(chain.clone(), &nothing, &options).err().map(|error| error.code);
+        let found = shown_by_series(chain, &nothing, &Limits::default());
+        let found: Vec<_> = found.iter().map(|f| (Some(f.code), f.weight)).collect();
+        assert_eq!(found, [(code, Weight::Note)]);
+    }
+}
