@@ -76,6 +76,27 @@ fn limit_bytes() -> Option<u64> {
     line.split_whitespace().next()?.parse().ok()
 }
 
+/// What a panic says where a thread, or memory for it, could not be had.
+const LACKING: [&str; 3] = ["failed to spawn thread", "ThreadPoolBuildError", "Cannot allocate memory"];
+
+fn is_of_lack(panic: &str) -> bool {
+    LACKING.iter().any(|words| panic.contains(words))
+}
+
+/// In such a child a panic for lack of memory aborts, as allocations do: so it is told from every other.
+pub(super) fn abort_where_it_lacks() {
+    if std::env::var_os(CHILD).is_none() {
+        return;
+    }
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        usual(panic);
+        if is_of_lack(&panic.to_string()) {
+            std::process::abort();
+        }
+    }));
+}
+
 /// Ended by an allocation, a stack or a thread that could not be had.
 #[cfg(unix)]
 fn lacked_memory(ended: ExitStatus) -> bool {
@@ -83,8 +104,7 @@ fn lacked_memory(ended: ExitStatus) -> bool {
     const ABORT: i32 = 6;
     const BUS: i32 = 7;
     const SEGMENT: i32 = 11;
-    const PANIC: i32 = 101;
-    ended.signal().is_some_and(|s| [ABORT, BUS, SEGMENT].contains(&s)) || ended.code() == Some(PANIC)
+    ended.signal().is_some_and(|s| [ABORT, BUS, SEGMENT].contains(&s))
 }
 
 #[cfg(not(unix))]
@@ -94,7 +114,28 @@ fn lacked_memory(_: ExitStatus) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::capped;
+    use super::{capped, is_of_lack};
+
+    #[test]
+    fn a_panic_is_no_lack_of_memory_unless_it_says_so() {
+        assert!(!is_of_lack(
+            "panicked at src/solve/block.rs:7:5:\nindex out of bounds: the len is 0 but the index is 0"
+        ));
+        for lack in [
+            "failed to spawn thread: Os { code: 11, kind: WouldBlock, message: \"Resource temporarily unavailable\" }",
+            "The global thread pool has not been initialized.: ThreadPoolBuildError { kind: IOError(Os { code: 11 }) }",
+        ] {
+            assert!(is_of_lack(lack), "{lack}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_code_of_a_child_that_panicked_is_passed_on() {
+        use std::os::unix::process::ExitStatusExt;
+        let [panicked, aborted] = [101 << 8, 6].map(std::process::ExitStatus::from_raw);
+        assert_eq!([panicked, aborted].map(super::lacked_memory), [false, true]);
+    }
 
     #[test]
     fn a_core_gets_four_threads_at_most() {

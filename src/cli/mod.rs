@@ -130,6 +130,7 @@ pub fn main() -> ExitCode {
     if let Some(code) = memory::in_a_child() {
         return code;
     }
+    memory::abort_where_it_lacks();
     if cli.quiet {
         progress::silence();
     }

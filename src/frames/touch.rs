@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
-use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries, intern, stop_name};
+use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries, intern, postures_of_stops, stop_name};
 use crate::series::JointsBeside;
 
 /// A place is that of a marker from which it is no farther, m: what a file rounds.
@@ -72,12 +72,12 @@ impl Touches {
     /// Places in more than one frame; measurements at stops without readings; no measurements at all.
     pub fn of(series: &[MeasuredSeries]) -> Result<Self> {
         let mut touches = Self::default();
-        for (index, s) in series.iter().enumerate() {
+        for (index, (s, at_stops)) in series.iter().zip(postures_of_stops(series)).enumerate() {
             let mut postures = vec![None; s.stops.len()];
             for b in &s.bodies {
                 let stop = &s.stops[b.stop];
                 let place = || format!("series {}, stop {}", s.name, stop.image);
-                let Some(readings) = &stop.readings else {
+                let Some(at_stop) = &at_stops[b.stop] else {
                     let what = "was measured, but its joint readings are not given";
                     return Err(Error::new(
                         Code::ReadingsMissing,
@@ -102,10 +102,7 @@ impl Touches {
                     }
                 };
                 let posture = *postures[b.stop].get_or_insert_with(|| {
-                    let before = b.stop.checked_sub(1).and_then(|k| s.stops[k].readings.as_ref());
-                    let step = |before: &Vec<f64>| readings.iter().zip(before).map(|(q, b)| q - b).collect();
-                    let approach = before.filter(|_| s.order_known).map(step);
-                    touches.postures.push(Posture { readings: readings.clone(), approach });
+                    touches.postures.push(at_stop.clone());
                     touches.postures.len() - 1
                 });
                 let body = intern(&mut touches.bodies, &b.body);

@@ -15,13 +15,9 @@ use crate::urdf::Chain;
 fn stops(series: &[Series], chain: &Chain) -> Result<Vec<Posture>> {
     let mut stops = Vec::new();
     for s in series {
-        let known = s.manifest.robot.order == StopOrder::Visited;
-        let mut previous: Option<Vec<f64>> = None;
-        for readings in readings_of(s, chain)?.into_iter().flatten() {
-            let step = |before: &Vec<f64>| readings.iter().zip(before).map(|(b, a)| b - a).collect();
-            stops.push(Posture { approach: previous.as_ref().filter(|_| known).map(step), readings: readings.clone() });
-            previous = Some(readings);
-        }
+        let order_known = s.manifest.robot.order == StopOrder::Visited;
+        let readings = readings_of(s, chain)?;
+        stops.extend(Posture::in_order(readings.iter().map(Option::as_deref), order_known).into_iter().flatten());
     }
     Ok(stops)
 }

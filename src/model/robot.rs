@@ -20,6 +20,17 @@ impl Posture {
     pub fn at(readings: &[f64]) -> Self {
         Self { readings: readings.to_vec(), approach: None }
     }
+
+    /// Stops in the order of their rows, each with the step from the last one before it that was on the robot; `None` off it.
+    pub fn in_order<'a>(rows: impl IntoIterator<Item = Option<&'a [f64]>>, order_known: bool) -> Vec<Option<Self>> {
+        let mut before: Option<&[f64]> = None;
+        let mut of_row = |readings: &'a [f64]| {
+            let step = |before: &[f64]| readings.iter().zip(before).map(|(q, b)| q - b).collect();
+            let approach = before.replace(readings).filter(|_| order_known).map(step);
+            Self { readings: readings.to_vec(), approach }
+        };
+        rows.into_iter().map(|row| row.map(&mut of_row)).collect()
+    }
 }
 
 /// A chain with its deviations from nominal.

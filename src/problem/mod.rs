@@ -4,6 +4,7 @@
 //! that turns a name into a column. The unit of residual evaluation is one image ([`linearise`]).
 
 mod adjustment;
+mod approach;
 mod body;
 mod body_chain;
 mod bounds;
@@ -35,6 +36,7 @@ mod stop;
 
 pub use crate::model::plate_modes::SCALE;
 pub use adjustment::Adjustment;
+pub use approach::{postures_of_run, postures_of_stops, runs};
 pub use body::{BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, InstrumentKind, places_body};
 pub use bounds::Bounds;
 pub use condensed::{SeenAtStop, by_columns, condensed};

@@ -66,12 +66,11 @@ pub fn read_without_robot(folder: &Path) -> Result<Series> {
 pub fn series_of_images(images: &[PathBuf], plate: &Path) -> Result<Series> {
     let mut inputs = Vec::new();
     let read = read_plate(plate, &mut inputs)?;
-    if let Some((k, twin)) =
-        images.iter().enumerate().find(|(k, i)| images[..*k].iter().any(|j| file_name(i) == file_name(j)))
-    {
-        let what = format!("has the name of image {k} as well");
+    let earlier = |k: usize| images[..k].iter().find(|image| file_name(image) == file_name(&images[k]));
+    if let Some((k, first)) = (0..images.len()).find_map(|k| Some((k, earlier(k)?))) {
+        let what = format!("has the name of {} as well", first.display());
         let remedy = "images are told apart by their names: rename one";
-        return Err(Error::new(Code::ImageTwice, twin.display(), what, remedy));
+        return Err(Error::new(Code::ImageTwice, images[k].display(), what, remedy));
     }
     let folder = plate.parent().map_or_else(PathBuf::new, Path::to_path_buf);
     Ok(Series {

@@ -204,10 +204,14 @@ fn single_images_need_a_plate_and_no_series() {
             Some(Code::ImageTwice),
             "img_023.png",
         ),
+        // By the path of the first of the two.
+        (vec!["detect", "--plate", name(&plate), "a/x.png", "b/y.png", "c/x.png"], Some(Code::ImageTwice), "a/x.png"),
         (vec!["detect", "--plate", name(&plate), "nowhere.png"], Some(Code::PlateNowhere), "nowhere.png"),
         (vec!["detect", "--series", "nowhere"], Some(Code::FileMissing), "nowhere"),
         (vec!["detect", "--series", name(&small), "--out", name(&small)], Some(Code::OutputForeign), "kr6_small"),
         (vec!["detect", "--study", "--views", "0"], Some(Code::OptionRange), "--views"),
+        (vec!["compare", "--urdf", "nowhere", "--monte-carlo", "--seeds", "0"], Some(Code::OptionRange), "--seeds"),
+        (vec!["compare", "--urdf", "nowhere", "--study", "--seeds", "1"], Some(Code::OptionRange), "--seeds"),
     ] {
         let args: Vec<&str> = if args.contains(&"--out") {
             args

@@ -481,6 +481,85 @@ fn points_that_a_model_misses_by_more_than_its_solution_states_are_no_good_verdi
     assert_eq!(judged(&copy, &right, &[]), (Some(0), vec![Code::CompensationNotGiven]));
 }
 
+/// A copy of the shipped report; its corrected description.
+fn own_report(folder: &Path) -> PathBuf {
+    let report = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/kr6_small");
+    for name in ["kuka_kr6_r900.calibrated.urdf", "compensation.toml", "solution.json"] {
+        std::fs::copy(report.join(name), folder.join(name)).unwrap();
+    }
+    folder.join("kuka_kr6_r900.calibrated.urdf")
+}
+
+fn judged_by_report(urdf: &Path, points: &Path, flags: &[&str]) -> std::process::Output {
+    let mut command = Command::cargo_bin("robotcal").unwrap();
+    command.args(["verify", "--joint-unit", "rad", "--urdf"]).arg(urdf).arg("--points").arg(points);
+    let output = command.args(flags).output().unwrap();
+    println!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+/// Less than what robots miss that nobody corrected is no merit of one whose solution states a tenth of it.
+#[test]
+fn a_solution_that_cannot_be_used_is_not_passed_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let urdf = own_report(folder.path());
+    let [compensation, solution] = ["compensation.toml", "solution.json"].map(|name| folder.path().join(name));
+    let compensation = ["--compensation", compensation.to_str().unwrap()];
+    let points = measured_by_a_tracker(folder.path(), 1e-3);
+    let judged = |points: &Path, flags: &[&str]| {
+        let output = judged_by_report(&urdf, points, &[&compensation, flags].concat());
+        let refused = String::from_utf8(output.stderr).unwrap();
+        let code = Code::ALL.iter().copied().find(|code| refused.starts_with(&format!("error[{}]", code.name())));
+        let is_named = refused.contains(solution.to_str().unwrap());
+        (output.status.code(), codes(&String::from_utf8(output.stdout).unwrap()), code.filter(|_| is_named))
+    };
+    assert_eq!(judged(&points, &[]), (Some(1), vec![Code::StatedExceeded], None));
+    let whole = std::fs::read_to_string(&solution).unwrap();
+    std::fs::write(&solution, &whole[..20_000]).unwrap();
+    assert_eq!(judged(&points, &[]), (Some(2), vec![], Some(Code::SolutionDamaged)));
+    std::fs::write(&solution, whole.replacen("\"format\":2", "\"format\":10000", 1)).unwrap();
+    let (exit, said, refused) = judged(&points, &[]);
+    assert!(exit == Some(2) && said.is_empty() && refused.is_some(), "{exit:?} {refused:?}");
+    // Of points at one reading of the first joint the base may be the link behind it.
+    std::fs::write(&solution, whole).unwrap();
+    let turned = by_some_joints(folder.path(), &[1, 2, 3, 4, 5], 0.0);
+    assert_eq!(judged(&turned, &["--base", "link_1"]), (Some(2), vec![], Some(Code::SolutionDiffers)));
+    // That of another description says nothing of this one, which is a doubt.
+    let text = std::fs::read_to_string(&urdf).unwrap();
+    assert!(text.contains("xyz=\"0.02494"), "an origin of this report");
+    std::fs::write(&urdf, text.replace("xyz=\"0.02494", "xyz=\"0.02496")).unwrap();
+    let urdf_alone = judged_by_report(&urdf, &measured_by_a_tracker(folder.path(), 0.0), &[]);
+    let said = codes(&String::from_utf8(urdf_alone.stdout).unwrap());
+    assert_eq!((urdf_alone.status.code(), said), (Some(0), vec![Code::SolutionDiffers]));
+}
+
+/// What the verdict is by, and what is stated, are of the same points.
+#[test]
+fn what_is_stated_is_of_the_points_without_the_wrong_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let urdf = own_report(folder.path());
+    let seen = std::fs::read_to_string(measured_with(folder.path(), 0.0, 2e-4)).unwrap();
+    let stated = |lines: &[String]| -> [f64; 2] {
+        let file = folder.path().join("some.csv");
+        std::fs::write(&file, lines.join("\n")).unwrap();
+        let flags = ["--compensation", folder.path().join("compensation.toml").to_str().unwrap()].map(str::to_owned);
+        let flags = [flags[0].as_str(), &flags[1], "--point-sigma-m", "0.0005"];
+        let output = judged_by_report(&urdf, &file, &flags);
+        assert_eq!(output.status.code(), Some(0));
+        let words: Vec<String> =
+            String::from_utf8(output.stdout).unwrap().split_whitespace().map(str::to_owned).collect();
+        let words = words.join(" ");
+        ["its solution states ", " mm here, at most "]
+            .map(|after| words.split_once(after).unwrap().1.split(' ').next().unwrap().parse().unwrap())
+    };
+    let mut lines: Vec<String> = seen.lines().take(1 + 40).map(str::to_owned).collect();
+    let (x, rest) = lines[6].split_once(',').unwrap();
+    lines[6] = format!("{:.9},{rest}", x.parse::<f64>().unwrap() + 0.03);
+    let with_wrong = stated(&lines);
+    lines.remove(6);
+    assert_eq!(with_wrong, stated(&lines));
+}
+
 /// The mean and the most that the solution of the shipped report states at points, mm, as it is or with this upper end of the intervals of its joint noise.
 fn stated_with_noise_up_to(points: &Path, most: Option<&serde_json::Value>) -> [f64; 2] {
     let report = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/kr6_small");

@@ -8,11 +8,11 @@ use robotcal::programs::LeftReason;
 fn krl_module(cell: &mut Cell, ipo: &str, moves: &str) -> Vec<(&'static str, String)> {
     let (a, b) = (cell.readings(), cell.readings());
     let (first, second) = (krl(cell, &a), krl(cell, &b));
-    let data = |n: u8, ipo: &str| format!("DECL FDAT FP{n}={{TOOL_NO 0,BASE_NO 0,IPO_FRAME #{ipo},POINT2[] \" \"}}\n");
+    let data = |n: u8, ipo: &str| format!("DECL FDAT FP{n}={{TOOL_NO 0,BASE_NO 0,IPO_FRAME {ipo},POINT2[] \" \"}}\n");
     let dat = format!(
         "DEFDAT a\nDECL E6POS XP1={first}\n{}DECL E6POS XP2={second}\n{}ENDDAT\n",
         data(1, ipo),
-        data(2, "BASE")
+        data(2, "#BASE")
     );
     vec![("a.src", format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{moves}END\n")), ("a.dat", dat)]
 }
@@ -27,13 +27,31 @@ fn targets_of_a_tool_that_is_fixed_in_the_room_are_left() {
         )
     };
     for (ipo, moves) in [
-        ("TCP", "FDAT_ACT=FP1\nPTP XP1\nFDAT_ACT=FP2\nPTP XP2\n".to_owned()),
-        ("TCP", with(1) + &with(2)),
-        ("BASE", "$IPO_MODE=#TCP\nPTP XP1\n$IPO_MODE=#BASE\nPTP XP2\n".to_owned()),
+        ("#TCP", "FDAT_ACT=FP1\nPTP XP1\nFDAT_ACT=FP2\nPTP XP2\n".to_owned()),
+        ("#TCP", with(1) + &with(2)),
+        ("#BASE", "$IPO_MODE=#TCP\nPTP XP1\n$IPO_MODE=#BASE\nPTP XP2\n".to_owned()),
+        // Which of the two a variable holds is not told.
+        ("#BASE", "M=#TCP\n$IPO_MODE=M\nPTP XP1\n$IPO_MODE=#BASE\nPTP XP2\n".to_owned()),
+        ("#BASE", "PTP XP1 WITH $IPO_MODE=M\nPTP XP2\n".to_owned()),
+        ("M", "FDAT_ACT=FP1\nPTP XP1\nFDAT_ACT=FP2\nPTP XP2\n".to_owned()),
     ] {
         let files = krl_module(&mut cell, ipo, &moves);
         assert_eq!(told(&cell, &files, &["--tool=0,0,100,0,0,0"]), (1, unknown.clone()), "{ipo}: {moves}");
     }
+}
+
+/// Where the text has neither the motion data nor the tool, it is the one on the flange that the user states.
+#[test]
+fn a_tool_that_is_stated_is_on_the_flange_where_the_text_does_not_tell() {
+    let mut cell = Cell::kuka(62);
+    let [(name, text), _] =
+        krl_module(&mut cell, "#BASE", "PTP XP1 WITH $TOOL=STOOL2(FP7), $IPO_MODE=SIPO_MODE(FP7.IPO_FRAME)\n")
+            .try_into()
+            .unwrap();
+    let (readings, tool) = (cell.readings(), "--tool=0,0,100,0,0,0");
+    let files = [(name, text.replace("XP1", &krl(&mut cell, &readings)))];
+    assert_eq!(told(&cell, &files, &[tool]), (1, vec![]));
+    assert_eq!(told(&cell, &files, &[]), (0, vec![LeftReason::ToolUnknown.name().to_owned()]));
 }
 
 #[test]
@@ -46,7 +64,7 @@ fn targets_of_a_robot_whose_foot_is_not_the_origin_of_the_world_are_left() {
             format!("DEFDAT $MACHINE PUBLIC\nFRAME $ROBROOT={{X 0.0,Y 0.0,Z {z},A 0.0,B 0.0,C 0.0}}\nENDDAT\n"),
         )
     };
-    let mut files = krl_module(&mut cell, "BASE", "PTP XP1\n");
+    let mut files = krl_module(&mut cell, "#BASE", "PTP XP1\n");
     files[1].1 = files[1].1.lines().filter(|l| !l.contains("P2=")).collect::<Vec<_>>().join("\n");
     for (z, left) in [("0.0", vec![]), ("500.0", unknown)] {
         files.truncate(2);

@@ -191,7 +191,6 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("cli/memory.rs BUS", "number of a signal"),
     ("cli/memory.rs LARGEST_FROM_HEAP", "size of a block of memory"),
     ("cli/memory.rs MOST_FOR_A_CORE", "threads"),
-    ("cli/memory.rs PANIC", "exit code of a panic"),
     ("cli/memory.rs SEGMENT", "number of a signal"),
     ("cli/series/plan.rs TRIAL_CANDIDATES", "samples of a trial"),
     ("cli/series/plan_targets.rs LEAST_SHARE", "what counts as taken up by the frames"),

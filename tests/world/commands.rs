@@ -472,6 +472,47 @@ fn too_few_targets_of_a_plan_are_refused() {
     }
 }
 
+#[test]
+fn targets_of_a_plan_in_another_unit_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, made) = plate(folder.path(), &["--sheet", "A4", "--markers", "100"]);
+    assert!(made.is_some());
+    let (urdf, out) = (root(KR6), folder.path().join("plan"));
+    let plate = folder.path().join("plate/plate.toml");
+    let targets = folder.path().join("targets.csv");
+    let paths = [&plate, &targets, &out].map(|path| path.to_str().unwrap());
+    let of = |unit: f64, flags: &[&str]| {
+        let row = |k: usize| {
+            let deg = [k * 7 % 60, k * 11 % 40, k * 13 % 50, k * 17 % 90, k * 19 % 70, k * 23 % 80];
+            let deg = [0, 1, 2, 3, 4, 5].map(|j| deg[j] as f64 + [-30.0, -100.0, 70.0, -45.0, 10.0, -40.0][j]);
+            deg.map(|deg| format!("{:.6}", deg * unit)).join(",")
+        };
+        let rows: Vec<String> = (0..20).map(row).collect();
+        let head = "joint_a1,joint_a2,joint_a3,joint_a4,joint_a5,joint_a6";
+        std::fs::write(&targets, format!("{head}\n{}\n", rows.join("\n"))).unwrap();
+        let given = ["plan", "--urdf", &urdf, "--plate", paths[0], "--targets", paths[1], "--out", paths[2]];
+        robotcal(&[&given, flags].concat())
+    };
+    let (rad, budget) = (1f64.to_radians(), ["--count", "12", "--candidates", "60"]);
+    for (unit, flags, code) in [
+        (rad, &[][..], Code::RadiansAsDegrees),
+        (rad, &["--targets-unit", "deg"], Code::RadiansAsDegrees),
+        (1.0, &["--targets-unit", "rad"], Code::DegreesAsRadians),
+    ] {
+        let output = of(unit, flags);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(code.name()) && !out.exists(), "{}", text(&output));
+    }
+    let plan = |unit: f64, flags: &[&str]| {
+        let output = of(unit, &[&budget, flags].concat());
+        assert!(out.is_dir(), "{}", text(&output));
+        let joints = std::fs::read(out.join("joints.csv")).unwrap();
+        std::fs::remove_dir_all(&out).unwrap();
+        joints
+    };
+    assert_eq!(plan(1.0, &[]), plan(rad, &["--targets-unit", "rad"]));
+}
+
 /// Programs for a robot are written by the limits.
 #[test]
 fn limits_in_degrees_are_refused_where_a_robot_is_to_be_moved() {

@@ -10,6 +10,7 @@ use clap::{Args, ValueEnum};
 use super::compensate_frames::{Choice, Side, Sides, known_error};
 use super::compensate_models::{corrected_already, equal, exchanged, not_given};
 use crate::cli::Verdict;
+use crate::cli::flags::joint_table::Unit;
 use crate::cli::flags::robot::noted_chain;
 use crate::cli::terminal::say::{self, say, say_line};
 use crate::diagnose::Weight;
@@ -26,6 +27,7 @@ use crate::programs::{
     self, Correction, Language, Left, Models, Postures, Program, ProgramSetting, Target, TargetKind, TargetOutcome,
     TextFile,
 };
+use crate::series::AngleUnit;
 use crate::urdf::{self, Chain, JointKind, RobotDescription};
 
 /// Flags of `compensate`.
@@ -126,12 +128,6 @@ pub struct CompensateArgs {
     nearest_posture: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Unit {
-    Rad,
-    Deg,
-}
-
 pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     let place = ResultFolder::among(&args.out)?;
     let nominal = args.nominal.as_ref().or(args.from.as_ref()).unwrap_or(&args.urdf);
@@ -228,7 +224,7 @@ fn setting<'a>(
     Ok(ProgramSetting {
         chain,
         axes,
-        rad_per_unit: args.joint_unit.map(|u| if u == Unit::Deg { 1f64.to_radians() } else { 1.0 }),
+        rad_per_unit: args.joint_unit.map(|unit| AngleUnit::from(unit).in_rad()),
         base: stands_on(args, &urdf::read(nominal)?).map_or_else(Pose::identity, |(_, pose)| pose),
         tool: frame("--tool", args.tool.as_deref(), language)?,
         work: frame("--work", args.work.as_deref(), language)?,

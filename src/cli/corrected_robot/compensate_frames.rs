@@ -49,6 +49,26 @@ pub(super) const SAME_ORIGIN: f64 = 1e-6;
 /// Why a value is not known.
 type Known<T> = std::result::Result<T, String>;
 
+/// Why the solution from which a description came is not at hand.
+pub(super) enum NoSolution {
+    /// None stands beside it.
+    Absent(String),
+    /// The one that stands there is of another description.
+    OfOther(Error),
+    /// The one that stands there cannot be used.
+    Unusable(Error),
+}
+
+impl NoSolution {
+    /// In words.
+    fn why(self) -> String {
+        match self {
+            Self::Absent(why) => why,
+            Self::OfOther(error) | Self::Unusable(error) => format!("{} {}; {}", error.place, error.what, error.remedy),
+        }
+    }
+}
+
 fn read_frames(path: &Path, side: &Side) -> Result<FramesRecord> {
     let named =
         |e: Error| Error { place: e.place.replacen(frames_record::FILE_NAME, &path.display().to_string(), 1), ..e };
@@ -125,8 +145,11 @@ impl Choice {
     ) -> Result<Option<MeasuredFrames>> {
         let Self::Measured { to, from } = self else { return Ok(None) };
         // Those with which the frames were found.
-        let limits =
-            solution(&sides.to, Some(&to.robot.solution.path))?.map_or_else(|_| Limits::default(), |s| s.limits());
+        let limits = match solution(&sides.to, Some(&to.robot.solution.path))? {
+            Ok(record) => record.limits(),
+            Err(NoSolution::Unusable(error)) => return Err(error),
+            Err(_) => Limits::default(),
+        };
         Ok(Some(MeasuredFrames {
             to: frames_of(to),
             from: from.as_ref().map(|f| frames_of(f)),
@@ -201,7 +224,7 @@ impl Choice {
                     let part = part(&record, sides.to.robot);
                     Ok(corrections::expected_errors(program, done, &exported_model(&record)?, part))
                 }
-                Err(why) => Err(why),
+                Err(none) => Err(none.why()),
             }),
         }
     }
@@ -226,7 +249,7 @@ fn frames_of(record: &FramesRecord) -> RobotFrames {
 fn framed(side: &Side, record: &FramesRecord, is_taught: bool) -> Result<Known<FramedRobot>> {
     let found = match solution(side, Some(&record.robot.solution.path))? {
         Ok(solution) => exported_model(&solution)?,
-        Err(why) => return Ok(Err(why)),
+        Err(none) => return Ok(Err(none.why())),
     };
     let (robot, knowledge) = record.known(&found)?;
     let tool = record.tool.as_ref().map(|t| Pose::from(&t.pose));
@@ -234,16 +257,23 @@ fn framed(side: &Side, record: &FramesRecord, is_taught: bool) -> Result<Known<F
 }
 
 /// The solution from which a description came.
-pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<SolutionRecord>> {
+///
+/// # Errors
+/// One that was given and cannot be used, or is of another robot.
+pub(super) fn solution(
+    side: &Side,
+    recorded: Option<&Path>,
+) -> Result<std::result::Result<SolutionRecord, NoSolution>> {
     let beside = side.urdf.with_file_name(solution_json::FILE_NAME);
     let there = [Some(beside.as_path()), recorded].into_iter().flatten().find(|p| p.is_file());
     let Some(path) = side.solution.or(there) else {
-        return Ok(Err(format!("no solution.json beside {}, and no --solution", side.urdf.display())));
+        let why = format!("no solution.json beside {}, and no --solution", side.urdf.display());
+        return Ok(Err(NoSolution::Absent(why)));
     };
     let record = match read_solution(path) {
         Ok(record) => record,
         Err(error) if side.solution.is_some() => return Err(error),
-        Err(_) => return Ok(Err(format!("{} cannot be read", path.display()))),
+        Err(error) => return Ok(Err(NoSolution::Unusable(error))),
     };
     let exported = exported_robot(&record)?.as_exported().chain;
     let origin = |name: &str| exported.joints.iter().find(|j| j.name == name).map(|j| j.origin);
@@ -259,19 +289,20 @@ pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Known<Sol
     if same || is_alone_of(&record, side) {
         return Ok(Ok(record));
     }
-    let (what, remedy) = match base_that_differs(&exported, chain) {
-        Some(base) => (
+    let differs = |what: String, remedy: String| Error::new(Code::SolutionDiffers, path.display(), what, remedy);
+    let none = match base_that_differs(&exported, chain) {
+        Some(base) => NoSolution::Unusable(differs(
             format!("is of the chain from {base}, and {} was read from {}", side.urdf.display(), chain.base),
             format!("give --base {base}, from which the robot was identified"),
-        ),
-        None => (
+        )),
+        None => NoSolution::OfOther(differs(
             format!("is not the solution from which {} came", side.urdf.display()),
             "give the solution.json that was written beside it".to_owned(),
-        ),
+        )),
     };
-    match side.solution {
-        Some(_) => Err(Error::new(Code::SolutionDiffers, path.display(), what, remedy)),
-        None => Ok(Err(format!("{} {what}; {remedy}", path.display()))),
+    match (side.solution, none) {
+        (Some(_), NoSolution::OfOther(error) | NoSolution::Unusable(error)) => Err(error),
+        (_, none) => Ok(Err(none)),
     }
 }
 

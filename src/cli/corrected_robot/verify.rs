@@ -83,7 +83,7 @@ impl Judged {
 
 fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     let model = judged(args, (&args.urdf, args.compensation.as_deref()), (file, unit))?;
-    let stated = Stated::beside(&args.urdf, &model.robot);
+    let (stated, of_other) = Stated::beside(&args.urdf, &model.robot)?;
     let limits = &Stated::limits_of(stated.as_ref());
     let device_m = point_sigma(args.point_sigma_m, limits)?;
     let zeros = args.readings.beside(stated.as_ref(), &args.urdf, &[])?;
@@ -125,6 +125,10 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
         if nominal.is_some() && gain.is_none() {
             reasons.against.push("the nominal model leaves nothing".into());
         }
+        let expected = match &without {
+            Some(others) => stated.as_ref().and_then(|s| s.at_points(&others.points, device_m)),
+            None => expected,
+        };
         let stated_here = stated.as_ref().zip(expected.map(|expected| expected.all));
         reasons.add(&Measured { urdf: &args.urdf, rms_m, stated: stated_here, gain }, limits);
         if !reasons.is_bad() {
@@ -133,6 +137,7 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
         }
     }
     let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
+    reasons.findings.extend(of_other);
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     Ok(reasons.verdict())
 }

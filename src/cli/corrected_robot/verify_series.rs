@@ -17,7 +17,7 @@ use crate::cli::Verdict;
 use crate::cli::flags::recording::RecordingArgs;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::say::say_line;
-use crate::diagnose::Finding;
+use crate::diagnose::{Finding, Weight};
 use crate::error::{Code, Error, Result};
 use crate::identify::{
     JudgedImage, JudgedSeries, Options, RobotModel, RobotOfOtherZeros, Selection, identify, in_told_postures,
@@ -79,16 +79,18 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
 struct Model {
     robot: Robot,
     stated: Option<Stated>,
+    /// Said where the solution beside it is of another description.
+    of_other: Option<FileFinding>,
     limits: Limits,
 }
 
 impl Model {
     fn of(args: &VerifyArgs, chain: Chain) -> Result<Self> {
         let robot = compensated(chain, args.compensation.as_deref())?;
-        let stated = Stated::beside(&args.urdf, &robot);
+        let (stated, of_other) = Stated::beside(&args.urdf, &robot)?;
         // A flag that means nothing is refused before images are read.
         args.readings.beside(stated.as_ref(), &args.urdf, &[])?;
-        Ok(Self { limits: Stated::limits_of(stated.as_ref()), stated, robot })
+        Ok(Self { limits: Stated::limits_of(stated.as_ref()), stated, of_other, robot })
     }
 }
 
@@ -127,7 +129,7 @@ fn weigh(
     (seen, images): (&Seen<'_>, &[&JudgedImage]),
     gain: Option<Gain<'_>>,
 ) -> Reasons {
-    let Model { robot, stated, limits } = model;
+    let Model { robot, stated, of_other, limits } = model;
     let urdf = &args.urdf;
     let expected = stated.as_ref().and_then(|s| Some((s, s.at_stops(seen.series)?)));
     let rms_m = 1e-3 * root_mean_square(&units(images));
@@ -138,6 +140,7 @@ fn weigh(
         reasons.add_own(urdf, stated);
     }
     let side = Side { robot, urdf, solution: None };
+    reasons.findings.extend(of_other.clone());
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     if reasons.misses() || is_unexplained {
         match by_other_readings(urdf, model, seen) {
@@ -167,6 +170,7 @@ fn of_other_zeros(args: &VerifyArgs, model: &Model, seen: &Seen<'_>, other: &Rob
         None => reasons.findings.extend(other.zeros.iter().map(|zero| zero_off(zero, &subject))),
     }
     let side = Side { robot: &model.robot, urdf, solution: None };
+    reasons.findings.extend(model.of_other.clone());
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     Ok(reasons)
 }
@@ -199,7 +203,17 @@ fn shown_by_series(chain: Chain, series: &[MeasuredSeries], limits: &Limits) -> 
         Finding::ZeroOff(zero) => Some(zero_off(zero, &found.notice().place)),
         _ => of_series(found),
     };
-    found.map_or_else(|_| Vec::new(), |solution| solution.findings.iter().filter_map(of).collect())
+    match found {
+        Ok(solution) => solution.findings.iter().filter_map(of).collect(),
+        Err(error) => vec![refused(&error)],
+    }
+}
+
+/// Why the series cannot be fitted with the origins of the model held, which may be why the model misses it.
+fn refused(error: &Error) -> FileFinding {
+    let Error { code, place, what, remedy, .. } = error;
+    let text = format!("{place}: {what}, with the origins of the model held; {remedy}");
+    FileFinding::new(*code, Weight::Note, place, [], text)
 }
 
 /// The robot that a model is compared with, and its images. It is there to compare with and is not judged: where its zeros do not fit, it is taken
@@ -293,4 +307,21 @@ fn line(what: &str, file: &Path, images: &[&JudgedImage]) -> String {
         root_mean_square(&units(images)),
         root_mean_square(&px)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn why_a_series_cannot_be_fitted_is_said() {
+        let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+        let chain = crate::urdf::read(&urdf).unwrap().chain(None, None).unwrap();
+        let nothing = [MeasuredSeries::without_images("a", true, Vec::new())];
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        let code = identify(chain.clone(), &nothing, &options).err().map(|error| error.code);
+        let found = shown_by_series(chain, &nothing, &Limits::default());
+        let found: Vec<_> = found.iter().map(|f| (Some(f.code), f.weight)).collect();
+        assert_eq!(found, [(code, Weight::Note)]);
+    }
 }

@@ -5,15 +5,18 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, Vector3, Vector6};
 
-use super::compensate_frames::{Side, part, solution};
+use super::compensate_frames::{NoSolution, Side, part, solution};
 use crate::assess::{
     Limits, MeasuredPoint, NORMAL_95, PredictedFlange, by_readings, fit_points, most_of_sum, root_mean_square,
 };
+use crate::diagnose::Weight;
+use crate::error::{Error, Result};
 use crate::model::joint_terms::Term;
 use crate::model::robot::{Posture, Robot};
+use crate::output::corrections::FileFinding;
 use crate::output::restore::{FoundModel, exported_model, measured_series};
 use crate::output::solution_json::{self, SolutionRecord};
-use crate::problem::{Exposures, MeasuredSeries};
+use crate::problem::{Exposures, MeasuredSeries, postures_of_stops};
 use crate::series::{InputFile, SpatialFiles};
 
 /// The solution from which a description came, with as much of its model as is judged.
@@ -50,14 +53,22 @@ const FITTED: f64 = 9.0;
 const FLAT_FIELD: [&str; 2] = ["dark", "white"];
 
 impl Stated {
-    /// That of the solution.json beside a description; `None` where none stands there from which it came.
-    pub fn beside(urdf: &Path, robot: &Robot) -> Option<Self> {
+    /// That of the solution.json beside a description; where that is of another one, a note that says so.
+    ///
+    /// # Errors
+    /// One that stands there and cannot be used: without it the description would be judged by less.
+    pub fn beside(urdf: &Path, robot: &Robot) -> Result<(Option<Self>, Option<FileFinding>)> {
         let path = urdf.with_file_name(solution_json::FILE_NAME);
         let side = Side { robot, urdf, solution: None };
-        let record = solution(&side, None).ok()?.ok()?;
-        let found = exported_model(&record).ok()?;
+        let record = match solution(&side, None)? {
+            Ok(record) => record,
+            Err(NoSolution::Absent(_)) => return Ok((None, None)),
+            Err(NoSolution::OfOther(error)) => return Ok((None, Some(not_judged_by(urdf, &error)))),
+            Err(NoSolution::Unusable(error)) => return Err(error),
+        };
+        let found = exported_model(&record)?;
         let part = part(&record, robot).cloned();
-        Some(Self { path, record, found, part })
+        Ok((Some(Self { path, record, found, part }), None))
     }
 
     /// Those with which the solution was judged; where none stands beside a description, the usual ones.
@@ -68,7 +79,7 @@ impl Stated {
     /// At the stops of series: markers as far from the flange as what stands still is.
     pub fn at_stops(&self, series: &[MeasuredSeries]) -> Option<Expectation> {
         let flange = self.found.flange()?;
-        let stops: Vec<Posture> = series.iter().flat_map(postures).collect();
+        let stops: Vec<Posture> = postures_of_stops(series).into_iter().flatten().flatten().collect();
         let at: Vec<PredictedFlange> = stops.iter().map(|stop| flange.at(&stop.readings)).collect();
         let lever_m = |at: &PredictedFlange| at.pose.translation.norm();
         let of_model = at.iter().map(|at| {
@@ -188,6 +199,13 @@ impl Stated {
     }
 }
 
+/// What a solution of another description states is not held against this one.
+fn not_judged_by(urdf: &Path, error: &Error) -> FileFinding {
+    let Error { code, place, what, remedy, .. } = error;
+    let text = format!("{place} {what}: this robot is not held against what a solution states; {remedy}");
+    FileFinding::new(*code, Weight::Note, urdf.display(), [], text)
+}
+
 fn has_exposure_of(fitted: &[MeasuredSeries], series: &[MeasuredSeries]) -> bool {
     let known = Exposures::of(fitted.iter().flat_map(|s| &s.stops));
     series.iter().flat_map(|s| &s.stops).any(|stop| known.shows(stop))
@@ -227,14 +245,6 @@ fn displacements(a: &Robot, b: &Robot, stops: &[Posture]) -> Vec<Vector6<f64>> {
     let all: Vec<Vector6<f64>> = stops.iter().map(|stop| (tip(a, stop).inverse() * tip(b, stop)).log()).collect();
     let mean = all.iter().sum::<Vector6<f64>>() / all.len().max(1) as f64;
     all.into_iter().map(|twist| twist - mean).collect()
-}
-
-/// The stops of a series on the robot, in their order.
-fn postures(series: &MeasuredSeries) -> Vec<Posture> {
-    let all: Vec<&Vec<f64>> = series.stops.iter().filter_map(|stop| stop.readings.as_ref()).collect();
-    let step = |k: usize| Some(all[k].iter().zip(all[k.checked_sub(1)?]).map(|(q, before)| q - before).collect());
-    let approach = |k: usize| if series.order_known { step(k) } else { None };
-    (0..all.len()).map(|k| Posture { readings: all[k].clone(), approach: approach(k) }).collect()
 }
 
 fn is_measurement(path: &Path) -> bool {

@@ -185,11 +185,15 @@ impl Reasons {
     /// Says all of it.
     pub fn verdict(self) -> Verdict {
         say::findings(&self.findings);
-        let mut gates: Vec<&str> =
-            self.findings.iter().filter(|f| f.weight == Weight::Gate).map(|f| f.code.name()).collect();
-        gates.dedup();
+        let mut gates: Vec<&str> = Vec::new();
+        for finding in self.findings.iter().filter(|f| f.weight == Weight::Gate) {
+            if !gates.contains(&finding.code.name()) {
+                gates.push(finding.code.name());
+            }
+        }
         let is_own = self.has(Code::OwnMeasurement);
-        let doubt = [Code::StatedExceeded, Code::ModelsNotTold].into_iter().find(|code| self.has(*code));
+        let doubts = [Code::StatedExceeded, Code::ModelsNotTold, Code::SolutionDiffers];
+        let doubt = doubts.into_iter().find(|code| self.has(*code));
         let is_doubted = doubt.is_some() || !self.doubts.is_empty();
         let is_bad = self.is_bad();
         let word = match () {

@@ -20,6 +20,21 @@ pub fn command_of_report() -> String {
 
 /// Two numbers with an x between them.
 pub fn pair<T: std::str::FromStr + Copy>(text: &str) -> std::result::Result<[T; 2], String> {
-    let parts: Vec<T> = text.split(['x', 'X']).filter_map(|p| p.trim().parse().ok()).collect();
-    <[T; 2]>::try_from(parts).map_err(|_| "give two numbers with an x between them".to_owned())
+    let parts: Option<Vec<T>> = text.split(['x', 'X']).map(|part| part.trim().parse().ok()).collect();
+    let pair = parts.and_then(|parts| <[T; 2]>::try_from(parts).ok());
+    pair.ok_or_else(|| "give two numbers with an x between them".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::pair;
+
+    #[test]
+    fn a_pair_is_two_numbers_and_nothing_else() {
+        assert_eq!(pair("1280x1024"), Ok([1280, 1024]));
+        assert_eq!(pair("0.15 X 0.6"), Ok([0.15, 0.6]));
+        for text in ["1280xfoox1024", "1280x1024x", "x1280x1024", "1280", "1280x", "1x2x3", ""] {
+            assert!(pair::<u32>(text).is_err(), "{text}");
+        }
+    }
 }

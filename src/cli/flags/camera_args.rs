@@ -1,5 +1,6 @@
 //! Which cameras an adjustment begins with: a lens by name, or the camera file of another program.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -56,8 +57,8 @@ impl CameraArgs {
     }
 
     fn take(&self, given: &str, series: &mut [MeasuredSeries]) -> Result<Option<Notice>> {
-        let mut names: Vec<String> = series.iter().filter(|s| s.has_images).map(|s| s.camera.clone()).collect();
-        names.dedup();
+        let names: BTreeSet<&str> = series.iter().filter(|s| s.has_images).map(|s| s.camera.as_str()).collect();
+        let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
         let (name, path) = match given.split_once('=') {
             Some((name, path)) if names.iter().any(|n| n == name) => (name.to_owned(), PathBuf::from(path)),
             _ => match &names[..] {
@@ -198,6 +199,11 @@ cam1:
         let both = [of("left=FILE#cam1"), of("right=FILE#cam0")];
         assert_eq!(focal_lengths(&both, &["left", "right"]).unwrap(), [800.0, 1100.0]);
         assert_eq!(focal_lengths(&[of("FILE#cam1")], &["front"]).unwrap(), [800.0]);
+        // Of cameras by turns each is named once, too.
+        let by_turns = [of("left=FILE#cam1"), of("right=FILE#cam0")];
+        assert_eq!(focal_lengths(&by_turns, &["left", "right", "left"]).unwrap(), [800.0, 1100.0, 800.0]);
+        let refused = focal_lengths(&[of("FILE#cam1")], &["left", "right", "left"]).unwrap_err();
+        assert_eq!((refused.code, refused.what.matches("left").count()), (Code::OptionRange, 1));
         for given in ["back=FILE#cam1", "back=FILE"] {
             assert_eq!(focal_lengths(&[of(given)], &["front"]).unwrap_err().code, Code::OptionRange);
         }

@@ -69,11 +69,21 @@ impl CompareArgs {
 }
 
 pub fn run(args: &CompareArgs) -> Result<Verdict> {
+    require_worlds(args)?;
     match (args.study, args.monte_carlo) {
         (true, _) => study(args),
         (_, true) => monte_carlo(args),
         _ => series(args),
     }
+}
+
+/// Simulated worlds enough for an interval.
+fn require_worlds(args: &CompareArgs) -> Result<()> {
+    if args.seeds >= 2 || !(args.study || args.monte_carlo) {
+        return Ok(());
+    }
+    let what = "fewer than 2 worlds give no interval";
+    Err(Error::new(Code::OptionRange, "--seeds", what, "give 30 or more"))
 }
 
 fn series(args: &CompareArgs) -> Result<Verdict> {
@@ -110,14 +120,6 @@ fn truth_of(all: &[Series]) -> Result<Option<Truth>> {
 fn study(args: &CompareArgs) -> Result<Verdict> {
     let place = args.place(&STUDY)?;
     let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
-    if args.seeds < 2 {
-        return Err(Error::new(
-            Code::OptionRange,
-            "--seeds",
-            "fewer than 2 worlds give no interval",
-            "give 30 or more",
-        ));
-    }
     let request = StudyRequest { seeds: args.seeds, ..StudyRequest::full(chain) };
     let bar = progress::bar(1, "cells");
     let study = crate::study::study(&request, |done, total| {

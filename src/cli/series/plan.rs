@@ -7,7 +7,7 @@ use clap::Args;
 use clap::builder::ArgPredicate;
 use nalgebra::Vector3;
 
-use super::plan_targets::telling_targets;
+use super::plan_targets::TargetArgs;
 use super::plan_touches::{self, TouchArgs};
 use super::simulate::Mount;
 use crate::cli::Verdict;
@@ -100,9 +100,8 @@ pub struct PlanArgs {
     /// Joint terms that shall be found; auto plans for all of them [default: rigid; with --from those of the result]
     #[arg(long, value_enum, help_heading = "Robot")]
     robot_model: Option<Model>,
-    /// Accuracy is meant at these joint vectors (ten or more; columns as in joints.csv, degrees and m), not over the workspace
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["d_optimal", "parameters"], help_heading = "What is to be accurate")]
-    targets: Option<PathBuf>,
+    #[command(flatten)]
+    targets: TargetArgs,
     /// All parameters of the robot alike, not the flange
     #[arg(long, conflicts_with = "parameters", help_heading = "What is to be accurate")]
     d_optimal: bool,
@@ -190,7 +189,7 @@ fn numbers(flag: &str, text: &str, count: usize, remedy: &str) -> Result<Vec<f64
 
 pub fn run(args: &PlanArgs) -> Result<Verdict> {
     if let (Some(points), Some(from)) = (&args.touches.touch, &args.from) {
-        return plan_touches::run(&args.touches, points, from, args.targets.as_deref(), args.count, &args.out);
+        return plan_touches::run(&args.touches, points, from, &args.targets, args.count, &args.out);
     }
     check(args)?;
     if let Some(worlds) = args.study {
@@ -434,8 +433,8 @@ fn request(args: &PlanArgs, record: Option<&SolutionRecord>, chain: Chain) -> Re
 }
 
 fn demand(args: &PlanArgs, chain: &Chain) -> Result<Demand> {
-    if let Some(path) = &args.targets {
-        return Ok(Demand::Targets(telling_targets(path, chain)?));
+    if let Some(targets) = args.targets.telling(chain)? {
+        return Ok(Demand::Targets(targets));
     }
     Ok(match (args.d_optimal, args.parameters.is_empty()) {
         (true, _) => Demand::Parameters,

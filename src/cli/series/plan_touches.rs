@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nalgebra::Vector3;
 
-use super::plan_targets::targets;
+use super::plan_targets::TargetArgs;
 use crate::assess::Limits;
 use crate::cli::Verdict;
 use crate::cli::flags::pose_argument::pose;
@@ -54,7 +54,7 @@ pub(super) fn run(
     args: &TouchArgs,
     points: &Path,
     from: &Path,
-    target_file: Option<&Path>,
+    targets: &TargetArgs,
     count: usize,
     out: &Path,
 ) -> Result<Verdict> {
@@ -69,7 +69,7 @@ pub(super) fn run(
         }
     };
     let chain = &robot.exported().chain;
-    let wanted = target_file.map(|path| targets(path, chain)).transpose()?.unwrap_or_default();
+    let wanted = targets.read(chain)?.unwrap_or_default();
     let request = TouchRequest {
         points: read_points(points, &found.limits)?,
         tool: pose("--touch-tool", &args.touch_tool)?.unwrap_or_else(Pose::identity),

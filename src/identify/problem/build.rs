@@ -12,11 +12,11 @@ use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::camera::Camera;
 use crate::model::plate_modes::DOT_GAIN;
-use crate::model::robot::{Posture, Robot};
+use crate::model::robot::Robot;
 use crate::problem::{
     Adjustment, DISPLACEMENT_SIZES, Family, HUBER, Image, ImageRejection, JOINTS_IN_COMMON, Layout, Mark,
     MarkerObservation, MeasuredSeries, MeasuredStop, Names, Noise, PlateShape, Problem, State, Stop, Tie, intern,
-    release_measured_scales,
+    postures_of_run, release_measured_scales, runs,
 };
 use crate::series::{Edge, Observation, Plate};
 
@@ -197,30 +197,14 @@ impl Pictured {
 /// Stops of all series, and those of the rows of each: rows of one place in a run are one stop.
 fn stops_of(series: &[MeasuredSeries]) -> (Vec<Stop>, Vec<Vec<usize>>) {
     let (mut stops, mut places) = (Vec::new(), Vec::with_capacity(series.len()));
-    for (run, views) in series.chunk_by(|a, b| a.run.is_some() && a.run == b.run).enumerate() {
-        let rows = rows(views);
-        let mut previous: Option<&Vec<f64>> = None;
+    for (run, views) in runs(series).enumerate() {
         let first = stops.len();
-        for at in rows.values() {
-            let approach = previous.zip(at.readings.as_ref()).filter(|_| views[0].order_known);
-            let approach = approach.map(|(a, b)| b.iter().zip(a).map(|(b, a)| b - a).collect());
-            previous = at.readings.as_ref().or(previous);
-            let posture = at.readings.clone().map(|readings| Posture { readings, approach });
-            stops.push(Stop { series: run, posture, local_share: Vec::new() });
-        }
-        let place: BTreeMap<usize, usize> = rows.keys().enumerate().map(|(k, row)| (*row, first + k)).collect();
+        let postures = postures_of_run(views);
+        let place: BTreeMap<usize, usize> = postures.keys().enumerate().map(|(k, row)| (*row, first + k)).collect();
+        stops.extend(postures.into_values().map(|posture| Stop { series: run, posture, local_share: Vec::new() }));
         places.extend(views.iter().map(|s| s.stops.iter().map(|stop| place[&stop.row]).collect::<Vec<_>>()));
     }
     (stops, places)
-}
-
-/// A stop of every place in a run.
-fn rows(views: &[MeasuredSeries]) -> BTreeMap<usize, &MeasuredStop> {
-    let mut all = BTreeMap::new();
-    for stop in views.iter().flat_map(|s| &s.stops) {
-        all.entry(stop.row).or_insert(stop);
-    }
-    all
 }
 
 /// First guess of the local error of every reading that has columns for it; 0 for the others.

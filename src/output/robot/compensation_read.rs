@@ -34,6 +34,11 @@ enum Values {
 }
 
 impl Values {
+    /// True where all of it are numbers.
+    fn is_finite(&self) -> bool {
+        self.number().is_none_or(f64::is_finite) && self.list().iter().all(|number| number.is_finite())
+    }
+
     fn list(&self) -> &[f64] {
         match self {
             Self::Number(_) => &[],
@@ -80,6 +85,9 @@ fn terms_of(joint: &BTreeMap<String, Values>) -> std::result::Result<Vec<(Term, 
             (None, _) => return Err(format!("{key} is no term of a joint")),
             (Some(_), Values::Number(_)) => {}
         }
+        if !values.is_finite() {
+            return Err(format!("{key} is not finite"));
+        }
     }
     let value = |term: Term| match term.exported() {
         Exported::Nowhere => None,
@@ -117,6 +125,7 @@ pub fn parse_compensation(path: &Path, text: &str, chain: Chain) -> Result<Robot
     let file: File = toml::from_str(text).map_err(|e| {
         Error::new(Code::SettingSyntax, path.display(), e, "use the compensation.toml that identify wrote")
     })?;
+    require_finite(path, &file)?;
     check_urdf(path, &file.urdf, &chain)?;
     let chain =
         chain.carrying(file.payload.as_ref()).map_err(|e| Error::new(e.code, path.display(), e.what, e.remedy))?;
@@ -149,6 +158,21 @@ pub fn parse_compensation(path: &Path, text: &str, chain: Chain) -> Result<Robot
         }
     }
     Ok(Robot { terms, ..Robot::nominal(chain) })
+}
+
+/// Beside those of the joint terms.
+fn require_finite(path: &Path, file: &File) -> Result<()> {
+    let payload = file.payload.iter().map(|load| ("[payload]", load.mass_kg + load.centre_m.iter().sum::<f64>()));
+    let origins = file.urdf.iter().map(|(name, origin)| (name.as_str(), origin.iter().sum()));
+    match payload.chain(origins).find(|(_, sum)| !sum.is_finite()) {
+        None => Ok(()),
+        Some((name, _)) => Err(Error::new(
+            Code::SettingRange,
+            format!("{}: {name}", path.display()),
+            "holds a number that is not finite",
+            "use the compensation.toml that identify wrote",
+        )),
+    }
 }
 
 /// Numbers of a URDF that was written again by others may be rounded by this, m and rad.
@@ -188,6 +212,24 @@ mod tests {
         for odd in ["harmonics = [1e-4]", "harmonics = [1e-4, 0, 2e-4]"] {
             let what = read(odd).unwrap_err();
             assert!(what.contains("2 together") && what.contains("[a1, b1"), "{what}");
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_refused_with_its_joint_and_key() {
+        for (key, number) in [("gear_scale", "nan"), ("backlash", "inf"), ("gravity", "[0.1, nan]")] {
+            assert!(read(&format!("{key} = {number}")).unwrap_err().contains(key), "{key}");
+        }
+        let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/kuka_kr6_r900/kuka_kr6_r900.urdf");
+        let chain = crate::urdf::read(&urdf).unwrap().chain(None, None).unwrap();
+        for (text, place) in [
+            ("[joint.joint_a2]\ngear_scale = nan", "joint_a2"),
+            ("[urdf]\njoint_a2 = [0, nan, 0, 0, 0, 0]", "joint_a2"),
+            ("[payload]\nmass_kg = 1.0\ncentre_m = [0.0, 0.0, inf]", "payload"),
+        ] {
+            let refused = parse_compensation(Path::new("compensation.toml"), text, chain.clone()).unwrap_err();
+            assert_eq!(refused.code, Code::SettingRange, "{text}");
+            assert!(refused.place.contains(place), "{}", refused.place);
         }
     }
 

@@ -1,7 +1,7 @@
 //! What interrupts and triggers run beside the text, at a time that it does not tell: `INTERRUPT DECL n WHEN .. DO ..`, `TRIGGER WHEN .. DO ..`.
 
 use super::assigned::assigned;
-use super::frames::{FrameIs, Frames};
+use super::frames::{FrameIs, Frames, IpoMode};
 use super::{Module, Now, unset};
 use crate::programs::flow::{Either, Followed, Held};
 use crate::programs::scan::Reader;
@@ -41,7 +41,7 @@ impl Module<'_> {
     fn top_beside(&self, names: &[String]) -> Now {
         let (mut active, stands) = self.now.clone();
         let [tool, base] = [&active.tool, &active.base].map(|is| is.value.at_some_time(RUN_AT_ANY_TIME));
-        active.set(Frames { tool, base, tool_in_room: active.tool_in_room.value });
+        active.set(Frames { tool, base, ipo_mode: active.ipo_mode.value });
         active.off_zero.set(active.off_zero.value.either(&self.off_zero_anywhere));
         names.iter().for_each(|name| _ = active.beside.value.remove(name));
         (active, stands)
@@ -65,7 +65,7 @@ impl Module<'_> {
         let start = reader.at;
         let name = is_set(reader);
         let matters = match name.as_deref() {
-            Some("$IPO_MODE") => self.is_tool_in_room(reader),
+            Some("$IPO_MODE") => self.ipo_mode(reader) != IpoMode::Base,
             Some("$ORI_TYPE") => self.keeps_orientation(reader),
             _ => true,
         };
@@ -89,7 +89,7 @@ impl Module<'_> {
             match name.as_str() {
                 "$TOOL" => at_some_time(&mut self.now.0.tool),
                 "$BASE" => at_some_time(&mut self.now.0.base),
-                "$IPO_MODE" => self.now.0.tool_in_room.set(true),
+                "$IPO_MODE" => self.now.0.ipo_mode.set(IpoMode::Tcp),
                 "$ORI_TYPE" => self.now.0.keeps_orientation.set(true),
                 routine => {
                     // The event may come here.

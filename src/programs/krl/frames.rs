@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::aggregate::Aggregate;
 use crate::geom::Pose;
 use crate::programs::external::OffZero;
 use crate::programs::flow::{Either, Followed, Held};
@@ -134,26 +135,75 @@ impl Either for FrameIs {
     }
 }
 
+/// `$IPO_MODE`, from what casts no doubt on a target to what leaves none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum IpoMode {
+    /// The robot holds the tool (`#BASE`).
+    Base,
+    /// The text does not tell which.
+    Untold,
+    /// The tool is fixed in the room, and the robot holds the work (`#TCP`), or may do so.
+    Tcp,
+}
+
+impl IpoMode {
+    /// Of the value of this name.
+    pub fn named(name: Option<&str>) -> Self {
+        match name {
+            Some("TCP") => Self::Tcp,
+            Some("BASE" | "NONE") => Self::Base,
+            _ => Self::Untold,
+        }
+    }
+
+    /// Of motion data; those that do not state it leave it as it is usually.
+    pub fn of_data(data: &Aggregate) -> Self {
+        if data.has(&[IPO_FRAME]) { Self::named(data.word(IPO_FRAME)) } else { Self::Base }
+    }
+}
+
+impl Either for IpoMode {
+    fn either(&self, other: &Self) -> Self {
+        *self.max(other)
+    }
+}
+
+/// `$IPO_MODE` in motion data.
+const IPO_FRAME: &str = "IPO_FRAME";
+
 /// `$TOOL`, `$BASE` and `$IPO_MODE` of a motion.
 #[derive(Debug, Clone)]
 pub(super) struct Frames {
     pub tool: FrameIs,
     pub base: FrameIs,
-    /// The tool is fixed in the room, and the robot holds the work (`#TCP`).
-    pub tool_in_room: bool,
+    pub ipo_mode: IpoMode,
 }
 
 impl Default for Frames {
     fn default() -> Self {
-        Self { tool: FrameIs::Unset, base: FrameIs::Unset, tool_in_room: false }
+        Self { tool: FrameIs::Unset, base: FrameIs::Unset, ipo_mode: IpoMode::Base }
     }
 }
 
 impl Frames {
+    /// Whether `$TOOL` goes with the flange, else why not. Where the text tells neither that nor the tool, it is as the user states.
+    pub fn is_on_flange(&self) -> std::result::Result<(), &'static str> {
+        match self.ipo_mode {
+            IpoMode::Untold if matches!(self.tool, FrameIs::Known(_)) => {
+                Err("whether the tool is fixed in the room is not known: $IPO_MODE is not written as #BASE or #TCP")
+            }
+            IpoMode::Base | IpoMode::Untold => Ok(()),
+            IpoMode::Tcp => Err("the tool is fixed in the room ($IPO_MODE #TCP)"),
+        }
+    }
+
     /// Tool and `base_from_work` of a motion to axes; those that the user states and the foot of the robot beside them.
     pub fn beside_joints(&self, stated: [Option<Pose>; 2], base: &Pose) -> [StatedFrame; 2] {
         let none = Pose::identity();
-        let tool = if self.tool_in_room { StatedFrame::Elsewhere } else { self.tool.beside_joints(stated[0], &none) };
+        let tool = match self.is_on_flange() {
+            Ok(()) => self.tool.beside_joints(stated[0], &none),
+            Err(_) => StatedFrame::Elsewhere,
+        };
         [tool, self.base.beside_joints(stated[1], base)]
     }
 }
@@ -163,7 +213,7 @@ impl Frames {
 pub(super) struct Active {
     pub tool: Held<FrameIs>,
     pub base: Held<FrameIs>,
-    pub tool_in_room: Held<bool>,
+    pub ipo_mode: Held<IpoMode>,
     /// On a path the tool keeps its orientation, or may keep it.
     pub keeps_orientation: Held<bool>,
     /// A sensor moves the robot on top of its targets, or may do so.
@@ -177,11 +227,11 @@ pub(super) struct Active {
 impl Active {
     /// Nothing yet.
     pub fn unset() -> Self {
-        let Frames { tool, base, tool_in_room } = Frames::default();
+        let Frames { tool, base, ipo_mode } = Frames::default();
         Self {
             tool: Held::new(tool),
             base: Held::new(base),
-            tool_in_room: Held::new(tool_in_room),
+            ipo_mode: Held::new(ipo_mode),
             keeps_orientation: Held::new(false),
             is_sensed: Held::new(false),
             off_zero: Held::new(OffZero::default()),
@@ -194,7 +244,7 @@ impl Active {
         let either = |one: &FrameIs, other: &FrameIs| one.either(other, why);
         self.tool.or_passed_by(&end.tool, either);
         self.base.or_passed_by(&end.base, either);
-        self.tool_in_room.or_passed_by(&end.tool_in_room, |_, _| true);
+        self.ipo_mode.or_passed_by(&end.ipo_mode, IpoMode::either);
         self.keeps_orientation.or_passed_by(&end.keeps_orientation, |_, _| true);
         self.is_sensed.or_passed_by(&end.is_sensed, |_, _| true);
         self.off_zero.or_passed_by(&end.off_zero, OffZero::either);
@@ -205,7 +255,7 @@ impl Active {
     pub fn set(&mut self, frames: Frames) {
         self.tool.set(frames.tool);
         self.base.set(frames.base);
-        self.tool_in_room.set(frames.tool_in_room);
+        self.ipo_mode.set(frames.ipo_mode);
     }
 }
 
@@ -215,7 +265,7 @@ impl Followed for Active {
         Self {
             tool: self.tool.merged(&other.tool, either),
             base: self.base.merged(&other.base, either),
-            tool_in_room: self.tool_in_room.merged(&other.tool_in_room, |_, _| true),
+            ipo_mode: self.ipo_mode.merged(&other.ipo_mode, IpoMode::either),
             keeps_orientation: self.keeps_orientation.merged(&other.keeps_orientation, |_, _| true),
             is_sensed: self.is_sensed.merged(&other.is_sensed, |_, _| true),
             off_zero: self.off_zero.merged(&other.off_zero, OffZero::either),
@@ -227,7 +277,7 @@ impl Followed for Active {
         Self {
             tool: self.tool.at_top(),
             base: self.base.at_top(),
-            tool_in_room: self.tool_in_room.at_top(),
+            ipo_mode: self.ipo_mode.at_top(),
             keeps_orientation: self.keeps_orientation.at_top(),
             is_sensed: self.is_sensed.at_top(),
             off_zero: self.off_zero.at_top(),
@@ -239,7 +289,7 @@ impl Followed for Active {
         Self {
             tool: self.tool.behind_call(&end.tool),
             base: self.base.behind_call(&end.base),
-            tool_in_room: self.tool_in_room.behind_call(&end.tool_in_room),
+            ipo_mode: self.ipo_mode.behind_call(&end.ipo_mode),
             keeps_orientation: self.keeps_orientation.behind_call(&end.keeps_orientation),
             is_sensed: self.is_sensed.behind_call(&end.is_sensed),
             off_zero: self.off_zero.behind_call(&end.off_zero),
@@ -253,7 +303,7 @@ impl Followed for Active {
 pub(super) struct OwnFrames {
     pub tool: Option<FrameIs>,
     pub base: Option<FrameIs>,
-    pub tool_in_room: Option<bool>,
+    pub ipo_mode: Option<IpoMode>,
     pub keeps_orientation: Option<bool>,
 }
 
@@ -263,7 +313,7 @@ impl OwnFrames {
         Self {
             tool: self.tool.or_else(|| other.tool.clone()),
             base: self.base.or_else(|| other.base.clone()),
-            tool_in_room: self.tool_in_room.or(other.tool_in_room),
+            ipo_mode: self.ipo_mode.or(other.ipo_mode),
             keeps_orientation: self.keeps_orientation.or(other.keeps_orientation),
         }
     }
@@ -272,7 +322,7 @@ impl OwnFrames {
         Frames {
             tool: self.tool.unwrap_or_else(|| active.tool.value.clone()),
             base: self.base.unwrap_or_else(|| active.base.value.clone()),
-            tool_in_room: self.tool_in_room.unwrap_or(active.tool_in_room.value),
+            ipo_mode: self.ipo_mode.unwrap_or(active.ipo_mode.value),
         }
     }
 }

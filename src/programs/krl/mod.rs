@@ -244,8 +244,8 @@ impl Module<'_> {
         let (file, line) = (reader.index, reader.line());
         let Some((name, component)) = assigned(reader) else { return Ok(()) };
         if name == "$IPO_MODE" {
-            let is_in_room = self.is_tool_in_room(reader);
-            self.now.0.tool_in_room.set(is_in_room);
+            let mode = self.ipo_mode(reader);
+            self.now.0.ipo_mode.set(mode);
             return Ok(());
         }
         if name == "$ORI_TYPE" {
@@ -388,7 +388,7 @@ impl Module<'_> {
         let (mut active, _) = self.flow.at_label(&self.now);
         let [tool, base] =
             [&active.tool, &active.base].map(|is| is.value.at_some_time("a GOTO may come from elsewhere"));
-        active.set(Frames { tool, base, tool_in_room: active.tool_in_room.value });
+        active.set(Frames { tool, base, ipo_mode: active.ipo_mode.value });
         self.now.0 = active;
         self.may_carry();
         self.flow.arrives();
@@ -420,9 +420,7 @@ impl Module<'_> {
             };
             return Err(Why::new(LeftReason::NotATarget, words));
         }
-        if frames.tool_in_room {
-            return Err(Why::new(LeftReason::ToolUnknown, "the tool is fixed in the room ($IPO_MODE #TCP)"));
-        }
+        frames.is_on_flange().map_err(|words| Why::new(LeftReason::ToolUnknown, words))?;
         let at_root = match &self.root {
             FrameIs::Known(root) => *root == Pose::identity(),
             FrameIs::Unset => true,

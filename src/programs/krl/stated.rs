@@ -1,7 +1,7 @@
 //! Frames as statements state them: `$TOOL`, `$BASE`, `BAS(..)`, motion data, and what stands behind `WITH`.
 
 use super::aggregate::Aggregate;
-use super::frames::{FrameIs, Frames, OwnFrames};
+use super::frames::{FrameIs, Frames, IpoMode, OwnFrames};
 use super::moves::NULL_FRAME;
 use super::{Module, Value};
 use crate::geom::Pose;
@@ -50,7 +50,7 @@ impl Module<'_> {
         Some(Frames {
             tool: self.numbered("TOOL_DATA", tool),
             base: self.numbered("BASE_DATA", base),
-            tool_in_room: data.word("IPO_FRAME") == Some("TCP"),
+            ipo_mode: IpoMode::of_data(data),
         })
     }
 
@@ -109,7 +109,7 @@ impl Module<'_> {
                 }
                 Some("$IPO_MODE") => {
                     reader.at += 1;
-                    frames.tool_in_room = Some(self.is_tool_in_room(reader));
+                    frames.ipo_mode = Some(self.ipo_mode(reader));
                 }
                 Some("$ORI_TYPE") => {
                     reader.at += 1;
@@ -151,13 +151,14 @@ impl Module<'_> {
     }
 
     /// `#TCP`, `FP1.IPO_FRAME` and `SIPO_MODE(FP1.IPO_FRAME)`.
-    pub(super) fn is_tool_in_room(&self, reader: &Reader<'_>) -> bool {
+    pub(super) fn ipo_mode(&self, reader: &Reader<'_>) -> IpoMode {
         let named = |ahead| reader.name_of(reader.at + ahead);
         if reader.is_mark(b'#') {
-            return named(1).as_deref() == Some("TCP");
+            return IpoMode::named(named(1).as_deref());
         }
         let data = named(if reader.ahead_is_mark(1, b'(') { 2 } else { 0 }).map(Value::Name);
-        data.is_some_and(|d| self.resolved(&d).is_ok_and(|(data, _)| data.word("IPO_FRAME") == Some("TCP")))
+        let found = data.as_ref().and_then(|data| self.resolved(data).ok());
+        found.map_or(IpoMode::Untold, |(data, _)| IpoMode::of_data(data))
     }
 
     /// `BAS(#TOOL, n)`, `BAS(#BASE, n)`, and `BAS(#INITMOV, 0)`, which sets tool 1, the world as base, and a tool that the robot holds.
@@ -187,7 +188,7 @@ impl Module<'_> {
             }
             Some("INITMOV") => {
                 let (tool, base) = (self.numbered("TOOL_DATA", 1), FrameIs::Known(Pose::identity()));
-                self.now.0.set(Frames { tool, base, tool_in_room: false });
+                self.now.0.set(Frames { tool, base, ipo_mode: IpoMode::Base });
                 self.now.0.keeps_orientation.set(false);
             }
             _ => {}
