@@ -543,6 +543,61 @@ fn the_planned_programs_stop_where_no_straight_way_is_free() {
     assert_eq!((pauses, stops(&chosen, "trajectory.yaml", "teach:").len()), (0, 1));
 }
 
+/// Between two places of the plate stands a wall: the way past it has to be taught, or goes by a posture that is free with the plate at either place.
+#[test]
+fn the_way_from_one_place_of_the_plate_to_the_next_is_looked_at() {
+    let mut request = request("ur10e", 6);
+    let arm = request.setting.robot.chain.arm_length_m();
+    for ((_, pose), side) in request.setting.placements.iter_mut().zip([1.0, -1.0]) {
+        *pose = Pose::from_xyz_rpy([0.4 * arm, 0.35 * side * arm, 0.0], [0.0; 3]);
+    }
+    request.budget.least_per_placement = Some(2);
+    let half_m = Vector3::new(0.35 * arm, 0.02, 0.5 * arm);
+    let wall = OrientedBox { pose: Pose::from_xyz_rpy([0.6 * arm, 0.0, 0.4 * arm], [0.0; 3]), half_m };
+    let mut across = |boxes: Vec<OrientedBox>| {
+        request.scene.boxes = boxes;
+        let plan = plan(&request).unwrap();
+        let scene = Scene::new(&request.setting, &request.scene);
+        let at = |stop: usize| &plan.pool[stop];
+        let is_free = |ways: &[&Vec<f64>]| {
+            let free = |way: &[&Vec<f64>]| (0..2).all(|place| scene.way_is_free(way[0], way[1], place, 0.03));
+            ways.windows(2).all(free)
+        };
+        let moves = plan.legs.windows(2).filter(|pair| at(pair[0].stop).placement != at(pair[1].stop).placement);
+        let found = moves.map(|pair| {
+            let [from, to] = [0, 1].map(|k| &at(pair[k].stop).readings);
+            let ways: Vec<&Vec<f64>> = std::iter::once(from).chain(&pair[1].via).chain([to]).collect();
+            assert!(!pair[1].is_free || is_free(&ways), "{pair:?}");
+            assert!(pair[1].is_free || pair[1].via.is_empty(), "{pair:?}");
+            (is_free(&[from, to]), pair[1].is_free)
+        });
+        found.collect::<Vec<_>>()
+    };
+    let [(straight, _)] = across(vec![wall])[..] else { panic!("the plate is moved once") };
+    assert!(!straight);
+}
+
+/// A name means what it means for `identify --free`: a parameter, a block, or what fits its stars.
+#[test]
+fn parameters_are_named_in_planning_as_in_identify() {
+    let asked = |name: &str| {
+        let request = PlanRequest {
+            demand: Demand::Named(vec![name.to_owned()]),
+            candidates: CandidateOptions { count: 30, ..CandidateOptions::default() },
+            budget: Budget::default(),
+            rounds: 0,
+            ..request("ur10e", 4)
+        };
+        choose(&request).map(|choice| choice.chosen.len()).map_err(|error| error.code)
+    };
+    for name in ["elbow_joint", "robot/elbow_joint/origin.rx", "*.rx"] {
+        assert_eq!(asked(name), Ok(4), "{name}");
+    }
+    for name in ["elbow", "elbow_joint/origin.r", "camera", "*.focal"] {
+        assert_eq!(asked(name), Err(Code::ParameterUnknown), "{name}");
+    }
+}
+
 #[test]
 fn names_cannot_become_statements_of_the_planned_programs() {
     let mut request = request("ur10e", 4);
