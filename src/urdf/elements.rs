@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use roxmltree::Node;
 use urdf_rs::JointType;
 
+use super::limits::{SEARCHED_M, UNLIMITED_M};
 use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::geom::Pose;
 
@@ -289,8 +290,8 @@ fn limits(
 /// What counts as the range of a joint that states none.
 fn unlimited(read: &urdf_rs::Joint, place: String) -> Notice {
     let range = match read.joint_type {
-        JointType::Prismatic => "0.5 m (3.14 m where a posture is looked for)",
-        _ => "half a turn",
+        JointType::Prismatic => format!("{UNLIMITED_M} m ({SEARCHED_M} m where a posture is looked for)"),
+        _ => "half a turn".to_owned(),
     };
     let what = format!(
         "states no limits, which URDF demands of it: where its range counts, {range} to both sides of zero is taken"
