@@ -165,6 +165,7 @@ fn the_verdict_follows_the_gates_and_then_the_doubts() {
 #[test]
 fn what_was_seen_and_what_to_do_stay_apart() {
     let found = Finding::from(DoubtedSize::Contradicted {
+        plate: "plate".into(),
         measured: false,
         off: 0.02,
         sigma: 0.001,
@@ -258,6 +259,7 @@ fn a_pattern_that_was_found_is_said_beside_how_often_larger_ones_are() {
 #[test]
 fn rows_that_were_exchanged_are_put_right_before_a_failed_result_is_tried_again() {
     let doubted = DoubtedSize::Contradicted {
+        plate: "plate".into(),
         measured: false,
         off: 0.02,
         sigma: 0.001,
