@@ -7,7 +7,6 @@ use nalgebra::Vector3;
 use roxmltree::Node;
 use urdf_rs::JointType;
 
-use super::limits::{SEARCHED_M, UNLIMITED_M};
 use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::geom::Pose;
 
@@ -16,6 +15,13 @@ const KNOWN_CHILDREN: [&str; 9] =
     ["origin", "parent", "child", "axis", "limit", "mimic", "calibration", "dynamics", "safety_controller"];
 /// Five turns, rad: no wrist with stops turns farther.
 const MOST_RADIANS: f64 = 10.0 * std::f64::consts::PI;
+/// Range of a joint that states no limits to both sides of zero, rad.
+pub const UNLIMITED_RAD: f64 = std::f64::consts::PI;
+/// Range of a slide that states none to both sides of zero, m.
+pub const UNLIMITED_M: f64 = 0.5;
+/// How far from zero a reading of such a slide is looked for, m.
+pub const SEARCHED_M: f64 = 3.0;
+
 /// Two turns, degrees; what is larger says that there is no limit.
 const MOST_DEGREES: f64 = 720.0;
 const TYPES: [&str; 7] = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical"];

@@ -3,13 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::chain::{Chain, JointKind};
-
-/// Range of a joint that states no limits to both sides of zero, rad.
-pub const UNLIMITED_RAD: f64 = PI;
-/// Range of a slide that states none to both sides of zero, m.
-pub const UNLIMITED_M: f64 = 0.5;
-/// How far from zero a reading of such a slide is looked for, m.
-pub const SEARCHED_M: f64 = 3.0;
+use super::elements::{UNLIMITED_M, UNLIMITED_RAD};
 
 impl Chain {
     /// Lower and upper limit of every reading that the URDF limits, rad or m.
@@ -62,7 +56,7 @@ impl JointKind {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::urdf::RobotDescription;
+    use crate::urdf::{RobotDescription, SEARCHED_M};
 
     /// A slide from 1 to 5 m, a joint beside zero, one of two turns, and one without limits that another follows.
     const URDF: &str = "<robot name='r'><link name='a'/><link name='b'/><link name='c'/><link name='d'/><link name='e'/><link name='f'/>\
