@@ -207,8 +207,11 @@ mod tests {
         assert!(commands.iter().all(|c| c.get_after_help().is_some()));
     }
 
-    /// Flags of other programs that texts name: those of ROS.
-    const OF_OTHERS: [&str; 6] = ["child-frame-id", "dst", "dst-storage", "frame-id", "once", "src"];
+    /// Flags of programs of ROS that texts name, and a colour of the style sheet.
+    const OF_OTHERS: [&str; 7] = ["child-frame-id", "dst", "dst-storage", "frame-id", "once", "paper", "src"];
+
+    /// Flags that every program has.
+    const OF_ALL: [&str; 2] = ["help", "version"];
 
     /// The flags that the strings of a file name.
     fn named(text: &str) -> Vec<String> {
@@ -240,7 +243,7 @@ mod tests {
                     files += 1;
                     for flag in named(&std::fs::read_to_string(&path).unwrap()) {
                         assert!(
-                            known.contains(&flag) || OF_OTHERS.contains(&flag.as_str()),
+                            known.contains(&flag) || OF_OTHERS.iter().chain(&OF_ALL).any(|other| *other == flag),
                             "{}: --{flag}",
                             path.display()
                         );
