@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 use crate::outputs_support::{context, robot, solved};
 use robotcal::assess::{Bearer, Pattern, PatternTest};
 use robotcal::diagnose::{
-    DoubtedSize, ExchangedReadings, Finding, GivenCamera, InOrder, LensNotInRos, OddImage, ResidualPattern, SmallGain,
-    ToldBy, Weight,
+    DoubtedSize, ExchangedReadings, Finding, GivenCamera, InOrder, LensNotInRos, MarkerOff, OddImage, ResidualPattern,
+    SmallGain, ToldBy, Weight,
 };
 use robotcal::error::{Code, Notice};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
@@ -160,6 +160,12 @@ fn the_verdict_follows_the_gates_and_then_the_doubts() {
     record.failed_gates.push(gate.into());
     let page = report_html(&record, &Thumbnails::default());
     assert!(page.contains("class=\"verdict failed\"") && page.contains(gate));
+}
+
+#[test]
+fn of_several_plates_that_of_a_marker_is_named() {
+    let place = |plate: Option<String>| Finding::from(MarkerOff { marker: 3, plate, distance_m: 1e-3 }).notice().place;
+    assert_eq!([place(None), place(Some("plate 2".into()))], ["marker 3", "marker 3 of plate 2"]);
 }
 
 #[test]

@@ -179,29 +179,6 @@ fn poses_alone_doubt_a_stretched_plate_and_no_other() {
     assert_eq!(off(1.01, 1.0, Some((0, 47))), []);
 }
 
-/// Two plates at the same stops: which of them is in doubt, and of which a marker is elsewhere.
-#[test]
-fn of_several_plates_the_doubtful_one_is_named() {
-    let of = |name: &str, x: f64| MeasuredSeries {
-        name: name.into(),
-        plate_name: name.into(),
-        ..stated_series(x, 1.0, None)
-    };
-    let found = stand_alone(&[of("first", 1.0), of("second", 1.03)], &Limits::default()).unwrap();
-    let doubts = found.findings.iter().filter(|f| matches!(f, Finding::DoubtedSize(_)));
-    let places: Vec<(Code, String)> = doubts.map(|f| (f.code(), f.notice().place)).collect();
-    assert_eq!(places, [(Code::PlateUneven, "plate 2".to_owned())]);
-    let mut moved = of("second", 1.0);
-    moved.plate.markers[20].position_m.x += 1.5e-3;
-    let off = |series: &[MeasuredSeries]| {
-        let solution = identify(kr6(), series, &Options::default()).unwrap();
-        let off = solution.findings.iter().filter(|f| f.code() == Code::MarkerOff);
-        off.map(|f| f.notice().place).collect::<Vec<_>>()
-    };
-    assert_eq!(off(std::slice::from_ref(&moved)), ["marker 20"]);
-    assert_eq!(off(&[of("first", 1.0), moved]), ["marker 20 of plate 2"]);
-}
-
 /// The wrist alone turns: its links are short, and say next to nothing of the size of the plate.
 #[test]
 fn a_wrist_alone_doubts_no_plate() {
