@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::limits::Limits;
 use super::statistics::extent;
-use super::stops::{StopsKnowledge, Structural, range_of};
+use super::stops::{StopsKnowledge, Structural};
 use crate::model::robot::{Posture, Robot};
 use crate::problem::Layout;
 use crate::urdf::JointKind;
@@ -74,10 +74,10 @@ impl<'a> Adviser<'a> {
             all.sort_by(f64::total_cmp);
             all
         };
+        let ranges = robot.chain.ranges();
         let mut candidates = Vec::new();
         for base in stops.iter().step_by((stops.len() / BASES).max(1)).take(BASES) {
-            for reading in 0..readings {
-                let (low, high) = range_of(robot, reading);
+            for (reading, &(low, high)) in ranges.iter().enumerate() {
                 for k in 0..VALUES {
                     let value = low + (high - low) * k as f64 / (VALUES - 1) as f64;
                     let mut stop = Posture::at(&base.readings);

@@ -13,7 +13,7 @@ use super::limits::Limits;
 use super::mean_square::MeanSquare;
 use super::root_mean_square;
 use super::statistics::extent;
-use super::stops::{halton_stops, range_of};
+use super::stops::halton_stops;
 use super::used_stops::{still, stops};
 use crate::geom::{Pose, adjoint};
 use crate::linalg::SymmetricFactor;
@@ -62,8 +62,7 @@ pub struct WorkspacePoint {
 
 /// Samples of everything within the joint limits.
 pub(super) fn everywhere(robot: &Robot) -> Vec<Posture> {
-    let limits: Vec<(f64, f64)> = (0..robot.chain.readings.len()).map(|r| range_of(robot, r)).collect();
-    halton_stops(&limits, SAMPLES)
+    halton_stops(&robot.chain.ranges(), SAMPLES)
 }
 
 /// What is needed to predict.

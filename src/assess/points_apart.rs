@@ -27,10 +27,51 @@ pub struct OddPoints {
 /// these: least squares over what is left, until it is the same. `None` where there is none, or more than a fifth. Usual is the median of the others
 /// together with what the model is stated to miss at the point, m (`stated_m`, of every point; empty where nothing is stated).
 pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], limits: &Limits) -> Option<OddPoints> {
+    let beside = |odd: &[usize]| Beside::these(robot, points, odd, (stated_m, limits));
+    // They only grow in number, and only fall then, so that it ends.
     let mut odd: Vec<usize> = Vec::new();
+    let mut fit = beside(&odd)?;
     loop {
+        let all: Vec<usize> = (0..points.len()).filter(|k| odd.contains(k) || fit.beyond.contains(k)).collect();
+        if all.len() * limits.touches_for_one_left_out > points.len() {
+            return None;
+        }
+        if all == odd {
+            break;
+        }
+        fit = beside(&all)?;
+        odd = all;
+    }
+    while let Some((fewer, of_fewer)) = fit.without_the_good(&odd, beside) {
+        (odd, fit) = (fewer, of_fewer);
+    }
+    if odd.is_empty() {
+        return None;
+    }
+    let off_m = odd.iter().map(|k| fit.off_m[*k]).collect();
+    let wrong = wrong_points(robot, points, (&odd, &fit.without), limits).unwrap_or_default();
+    Some(OddPoints { points: odd, off_m, without: fit.without, wrong })
+}
+
+/// All points beside the fit of some.
+struct Beside {
+    without: PointFit,
+    /// How far each is from where it puts them, m.
+    off_m: Vec<f64>,
+    /// Those that are farther than is usual.
+    beyond: Vec<usize>,
+}
+
+impl Beside {
+    /// The fit of all but these.
+    fn these(
+        robot: &Robot,
+        points: &[MeasuredPoint],
+        left_out: &[usize],
+        (stated_m, limits): (&[f64], &Limits),
+    ) -> Option<Self> {
         let kept: Vec<MeasuredPoint> =
-            points.iter().enumerate().filter(|(k, _)| !odd.contains(k)).map(|(_, p)| p.clone()).collect();
+            points.iter().enumerate().filter(|(k, _)| !left_out.contains(k)).map(|(_, p)| p.clone()).collect();
         let without = fit_points(robot, &kept)?;
         let usual = median(without.residuals_m.iter().map(Vector3::norm).collect::<Vec<_>>())?;
         let bound = |k: usize| {
@@ -38,21 +79,23 @@ pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], lim
             (limits.set_aside_factor * usual).max(limits.displaced_m)
         };
         let off_m: Vec<f64> = points.iter().map(|p| without.residual_m(robot, p).norm()).collect();
-        let found: Vec<usize> = (0..points.len()).filter(|k| off_m[*k] > bound(*k)).collect();
-        if found.len() * limits.touches_for_one_left_out > points.len() {
+        let beyond = (0..points.len()).filter(|k| off_m[*k] > bound(*k)).collect();
+        Some(Self { without, off_m, beyond })
+    }
+
+    /// Those of the points that were left out which are beyond, with the fit of all others: what it finds good was drawn along by what is not.
+    /// `None` where they are all, and where the fit finds one of the others beyond again.
+    fn without_the_good(
+        &self,
+        left_out: &[usize],
+        beside: impl Fn(&[usize]) -> Option<Self>,
+    ) -> Option<(Vec<usize>, Self)> {
+        let fewer: Vec<usize> = left_out.iter().copied().filter(|k| self.beyond.contains(k)).collect();
+        if fewer == left_out {
             return None;
         }
-        // They only grow in number, so that it ends.
-        let all: Vec<usize> = (0..points.len()).filter(|k| odd.contains(k) || found.contains(k)).collect();
-        if all == odd {
-            if odd.is_empty() {
-                return None;
-            }
-            let off_m = odd.iter().map(|k| off_m[*k]).collect();
-            let wrong = wrong_points(robot, points, (&odd, &without), limits).unwrap_or_default();
-            return Some(OddPoints { points: odd, off_m, without, wrong });
-        }
-        odd = all;
+        let fit = beside(&fewer)?;
+        fit.beyond.iter().all(|k| fewer.contains(k)).then_some((fewer, fit))
     }
 }
 

@@ -24,10 +24,6 @@ const FRAMES: usize = 12;
 /// Stops of the ideal series.
 const IDEAL_STOPS: usize = 150;
 
-/// Range of a joint without limits, or with wider ones: rad, and m for a prismatic joint.
-const WIDEST_RAD: f64 = std::f64::consts::PI;
-const WIDEST_M: f64 = 0.5;
-
 /// Free columns of the robot's own parameters.
 pub fn robot_columns(layout: &Layout) -> Vec<usize> {
     layout.robot().filter(|&c| layout.columns[c].free).collect()
@@ -110,15 +106,6 @@ pub fn information_of_share(share: f64) -> f64 {
     share / (1.0 - share)
 }
 
-/// Range of a reading that stops may take: its limits, or a turn to both sides.
-pub fn range_of(robot: &Robot, reading: usize) -> (f64, f64) {
-    let chain = &robot.chain;
-    let widest = if chain.reading_kinds[reading] == JointKind::Prismatic { WIDEST_M } else { WIDEST_RAD };
-    let own = chain.joints.iter().find(|j| j.drive.is_some_and(|d| d.reading == reading && d.multiplier == 1.0));
-    let (low, high) = own.and_then(|j| j.limits).unwrap_or((-widest, widest));
-    (low.max(-widest), high.min(widest))
-}
-
 /// Points that fill a cube evenly (Halton, *On the efficiency of certain quasi-random sequences*, 1960): `index` from 1.
 fn halton(mut index: usize, base: usize) -> f64 {
     let (mut value, mut digit) = (0.0, 1.0);
@@ -134,8 +121,7 @@ const PRIMES: [usize; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
 
 /// Stops that fill the whole range of all joints, reached from all sides.
 pub fn ideal_stops(robot: &Robot) -> Vec<Posture> {
-    let ranges: Vec<(f64, f64)> = (0..robot.chain.readings.len()).map(|r| range_of(robot, r)).collect();
-    halton_stops(&ranges, IDEAL_STOPS)
+    halton_stops(&robot.chain.ranges(), IDEAL_STOPS)
 }
 
 /// Stops that fill ranges (rad or m) of all readings evenly.

@@ -184,6 +184,9 @@ fn is_own(target: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
     use clap::{CommandFactory, Parser};
 
     use super::{Cli, examples};
@@ -203,5 +206,52 @@ mod tests {
         let commands: Vec<_> = command.get_subcommands().filter(|c| c.get_name() != "help").collect();
         assert_eq!(commands.len(), examples::ALL.len());
         assert!(commands.iter().all(|c| c.get_after_help().is_some()));
+    }
+
+    /// Flags of programs of ROS that texts name, and a colour of the style sheet.
+    const OF_OTHERS: [&str; 7] = ["child-frame-id", "dst", "dst-storage", "frame-id", "once", "paper", "src"];
+
+    /// Flags that every program has.
+    const OF_ALL: [&str; 2] = ["help", "version"];
+
+    /// The flags that the strings of a file name.
+    fn named(text: &str) -> Vec<String> {
+        let own = text.split("#[cfg(test)]").next().unwrap_or_default();
+        let code = own.lines().filter(|line| !line.trim_start().starts_with("//"));
+        let ends = |c: char| !(c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
+        let of_line = |line: &str| {
+            let parts: Vec<String> =
+                line.split("--").skip(1).map(|rest| rest.split(ends).next().unwrap().to_owned()).collect();
+            parts
+        };
+        code.flat_map(of_line).filter(|flag| flag.starts_with(|c: char| c.is_ascii_lowercase())).collect()
+    }
+
+    #[test]
+    fn every_flag_that_a_text_names_is_there() {
+        let command = Cli::command();
+        let of = |command: &clap::Command| {
+            command.get_arguments().filter_map(|a| a.get_long().map(str::to_owned)).collect::<Vec<_>>()
+        };
+        let known: BTreeSet<String> = command.get_subcommands().flat_map(of).chain(of(&command)).collect();
+        let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
+        let mut files = 0;
+        while let Some(folder) = folders.pop() {
+            for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|e| e == "rs") {
+                    files += 1;
+                    for flag in named(&std::fs::read_to_string(&path).unwrap()) {
+                        assert!(
+                            known.contains(&flag) || OF_OTHERS.iter().chain(&OF_ALL).any(|other| *other == flag),
+                            "{}: --{flag}",
+                            path.display()
+                        );
+                    }
+                }
+            }
+        }
+        assert!(files > 300 && known.len() > 80, "{files} {}", known.len());
     }
 }

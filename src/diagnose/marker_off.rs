@@ -4,24 +4,33 @@ use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
+use crate::problem::PlateShape;
+use crate::series::Plate;
 
 /// A marker lies elsewhere than its plate file says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MarkerOff {
     /// Its id.
     pub marker: u32,
+    /// Its plate, where there are several.
+    pub plate: Option<String>,
     /// How far, m.
     pub distance_m: f64,
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<MarkerOff> {
-    let plates = fit.problem.plates.iter().zip(&fit.state.plates);
-    let markers = plates.flat_map(|(plate, shape)| plate.markers.iter().zip(&shape.corrections));
-    markers
-        .map(|(marker, correction)| (marker, correction.norm()))
-        .filter(|(marker, distance_m)| *distance_m > setting.limits.sigmas_beyond_tolerance * marker.sigma_m)
-        .map(|(marker, distance_m)| MarkerOff { marker: marker.id, distance_m })
-        .collect()
+    let problem = &fit.problem;
+    let several = problem.plates.len() > 1;
+    let off = |(k, (plate, shape)): (usize, (&Plate, &PlateShape))| {
+        let markers = plate.markers.iter().zip(&shape.corrections);
+        let all = markers.map(|(marker, correction)| (marker, correction.norm()));
+        let beyond = all.filter(|(marker, off_m)| *off_m > setting.limits.sigmas_beyond_tolerance * marker.sigma_m);
+        let plate = several.then(|| problem.plate_name(k));
+        beyond
+            .map(|(marker, distance_m)| MarkerOff { marker: marker.id, plate: plate.clone(), distance_m })
+            .collect::<Vec<_>>()
+    };
+    problem.plates.iter().zip(&fit.state.plates).enumerate().flat_map(off).collect()
 }
 
 impl Kind for MarkerOff {
@@ -42,7 +51,10 @@ impl Kind for MarkerOff {
     }
 
     fn place(&self) -> String {
-        format!("marker {}", self.marker)
+        match &self.plate {
+            Some(plate) => format!("marker {} of {plate}", self.marker),
+            None => format!("marker {}", self.marker),
+        }
     }
 
     fn seen(&self) -> String {

@@ -52,6 +52,8 @@ impl ToldBy {
 pub enum DoubtedSize {
     /// The links of the robot, or the positions of its controller, say another size.
     Contradicted {
+        /// The plate; its number where there are several.
+        plate: String,
         /// True where the size was measured (`[scale]`).
         measured: bool,
         /// Relative difference: larger is positive.
@@ -67,6 +69,8 @@ pub enum DoubtedSize {
     },
     /// Rows and columns differ in scale.
     Uneven {
+        /// The plate; its number where there are several.
+        plate: String,
         /// Relative difference.
         off: f64,
         /// Prior sigma of it.
@@ -112,7 +116,8 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     let some = fit.adjustment.some_stops(MOST_STOPS, MOST_STOPS);
     let told_by = ToldBy::of(state);
     let mut doubts = Vec::new();
-    for (k, plate) in problem.plates.iter().enumerate() {
+    for (k, stated) in problem.plates.iter().enumerate() {
+        let plate = problem.plate_name(k);
         let released = ReleasedSize::of(some.as_ref().unwrap_or(&fit.adjustment), k);
         let beyond = |told: &Told, sigmas: f64| told.off.abs() > sigmas * told.sigma;
         // A size that is stated wrongly makes the links look worse than they are, and what they say less certain; a stretched plate as well.
@@ -121,7 +126,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
         let fitted = if uneven.is_some() || is_suspected() { released.fitted(problem, setting) } else { None };
         let fitted = fitted.filter(|fitted| fitted.told.relative_sigma() < limits.plate_size_told);
         let in_order = || fitted.as_ref().map(|fitted| fitted.in_order.clone()).unwrap_or_default();
-        let measured = plate.scale.is_some();
+        let measured = stated.scale.is_some();
         if let Some(Fitted { told, .. }) = &fitted
             && let Some(weight) = match told {
                 told if beyond(told, limits.plate_size_sigmas) => Some(Weight::Gate),
@@ -130,14 +135,15 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
             }
         {
             let (off, sigma, in_order) = (told.off, told.sigma, in_order());
-            doubts.push(DoubtedSize::Contradicted { measured, off, sigma, weight, told_by, in_order });
+            let plate = plate.clone();
+            doubts.push(DoubtedSize::Contradicted { plate, measured, off, sigma, weight, told_by, in_order });
         }
         if let Some((off, tolerance)) = uneven {
             let along = fitted.as_ref().and_then(|Fitted { told, along, .. }| {
                 let (axes, by_markers) = ((*along)?, stretch(&fit.adjustment, k)?);
                 Some([0, 1].map(|axis| (axes[axis], told.sigma.hypot(by_markers[axis].1))))
             });
-            doubts.push(DoubtedSize::Uneven { off, tolerance, along, told_by, in_order: in_order() });
+            doubts.push(DoubtedSize::Uneven { plate, off, tolerance, along, told_by, in_order: in_order() });
         }
     }
     doubts
@@ -145,8 +151,9 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
 
 /// Plates whose rows and columns differ in scale, as images alone say: their shape needs no robot.
 pub fn uneven_plates(adjustment: &Adjustment, limits: &Limits) -> Vec<DoubtedSize> {
-    let all = (0..adjustment.problem.plates.len()).filter_map(|k| uneven(adjustment, k, limits));
-    let uneven = |(off, tolerance)| DoubtedSize::Uneven {
+    let all = (0..adjustment.problem.plates.len()).filter_map(|k| Some((k, uneven(adjustment, k, limits)?)));
+    let uneven = |(k, (off, tolerance))| DoubtedSize::Uneven {
+        plate: adjustment.problem.plate_name(k),
         off,
         tolerance,
         along: None,
@@ -204,7 +211,7 @@ impl Kind for DoubtedSize {
     }
 
     fn subjects(&self) -> Vec<Subject> {
-        vec![Subject::Body("plate".to_owned())]
+        vec![Subject::Body(self.place())]
     }
 
     fn quantities(&self) -> Vec<Quantity> {
@@ -220,7 +227,8 @@ impl Kind for DoubtedSize {
     }
 
     fn place(&self) -> String {
-        "plate".into()
+        let (Self::Contradicted { plate, .. } | Self::Uneven { plate, .. }) = self;
+        plate.clone()
     }
 
     fn seen(&self) -> String {

@@ -212,6 +212,7 @@ codes! {
         ImageTurned "image_turned" "viewers turn or mirror an image as its EXIF data ask; here pixels are as the sensor gave them",
         FlatFieldDrift "flat_field_drift" "dark or white images of the end differ from those of the begin",
         FlatFieldLeftOut "flat_field_left_out" "dark and white images are not applied to an image of few grey levels",
+        FlatFieldUnused "flat_field_unused" "dark or white images lie where they are of no camera",
         FlatFieldUseless "flat_field_useless" "white images are saturated, or not brighter than dark ones",
     }
     Input "Detection" {

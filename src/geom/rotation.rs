@@ -92,7 +92,10 @@ pub fn rpy_from_matrix(r: &Matrix3<f64>) -> [f64; 3] {
     [roll, pitch, (left[(1, 0)] - left[(0, 1)]).atan2(left[(0, 0)] + left[(1, 1)])]
 }
 
-/// The rotation nearest to `m` (polar decomposition by a symmetric eigenproblem); `None` when `m` is near singular.
+/// Second singular value over the first below which it is noise: it is the root of an eigenvalue of a product.
+const SINGULAR: f64 = 1e-7;
+
+/// The rotation nearest to `m` (polar decomposition by a symmetric eigenproblem); `None` where all of `m` is along one direction.
 pub fn project_to_so3(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     if !m.iter().all(|x| x.is_finite()) {
         return None;
@@ -102,7 +105,7 @@ pub fn project_to_so3(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
     let s = order.map(|i| eigen.eigenvalues[i].max(0.0).sqrt());
-    if s[1] <= 1e-12 * s[0] || s[0] == 0.0 {
+    if s[1] <= SINGULAR * s[0] || s[0] == 0.0 {
         return None;
     }
     v = Matrix3::from_columns(&order.map(|i| v.column(i).into_owned()));
@@ -113,4 +116,21 @@ pub fn project_to_so3(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let u2 = u0.cross(&u1);
     let v2 = v.column(0).cross(&v.column(1));
     Some(u0 * v.column(0).transpose() + u1 * v.column(1).transpose() + u2 * v2.transpose())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_along_one_direction_has_no_nearest_rotation() {
+        for k in 0..200 {
+            let turned = |seed: f64| exp_so3(&Vector3::new(seed.sin(), (2.0 * seed).cos(), (3.0 * seed).sin()));
+            let (a, b) = (turned(f64::from(k)), turned(0.7 * f64::from(k) + 1.0));
+            let with = |across: f64| a * Matrix3::from_diagonal(&Vector3::new(2.0, across, 0.0)) * b.transpose();
+            assert_eq!(project_to_so3(&with(0.0)), None, "{k}");
+            let off = project_to_so3(&with(1e-4)).map(|r| (r - a * b.transpose()).norm());
+            assert!(off.is_some_and(|off| off < 1e-6), "{k}: {off:?}");
+        }
+    }
 }

@@ -10,7 +10,7 @@ use rand::{Rng, RngExt};
 
 use crate::geom::Pose;
 use crate::model::robot::{Posture, Robot};
-use crate::urdf::{Chain, JointKind};
+use crate::urdf::{Chain, JointKind, SEARCHED_M};
 
 /// Newton steps before a start is given up.
 const STEPS: usize = 40;
@@ -18,8 +18,6 @@ const STEPS: usize = 40;
 const LONGEST_STEP: f64 = 0.5;
 /// Error of a solution, m and rad.
 const TOLERANCE: f64 = 1e-9;
-/// Range of a joint that the URDF does not limit, rad.
-const UNLIMITED: (f64, f64) = (-std::f64::consts::PI, std::f64::consts::PI);
 
 /// Random starts from which all postures of a pose are looked for; those of a six-axis arm are found several times by then.
 pub const POSTURE_STARTS: usize = 200;
@@ -63,34 +61,20 @@ pub fn turned(angle: f64, near: f64, (low, high): (f64, f64), beyond: &[f64]) ->
     std::iter::once(nearest).chain(beside).find(|v| (low..=high).contains(v)).unwrap_or(angle)
 }
 
-/// Lower and upper limit of every reading that the URDF limits, rad or m.
-///
-/// The limits of a mimic joint are limits of the joint that it follows.
+/// Lower and upper limit of every reading that the URDF limits, as [`Chain::stated_limits`].
 pub fn stated_limits(chain: &Chain) -> Vec<Option<(f64, f64)>> {
-    let mut limits: Vec<Option<(f64, f64)>> = vec![None; chain.readings.len()];
-    for joint in &chain.joints {
-        let (Some(drive), Some((low, high))) = (joint.drive, joint.limits) else { continue };
-        if drive.multiplier == 0.0 {
-            continue;
-        }
-        let [a, b] = [low, high].map(|l| (l - drive.offset) / drive.multiplier);
-        let own = (a.min(b), a.max(b));
-        let merged = limits[drive.reading].map_or(own, |(l, h)| (l.max(own.0), h.min(own.1)));
-        limits[drive.reading] = Some(merged);
-    }
-    limits
+    chain.stated_limits()
 }
 
-/// Lower and upper limit of every reading, rad or m; joints without limits get one turn.
+/// Lower and upper limit of every reading within which a posture is looked for, rad or m.
 pub fn reading_limits(chain: &Chain) -> Vec<(f64, f64)> {
-    stated_limits(chain).into_iter().map(|l| l.unwrap_or(UNLIMITED)).collect()
+    chain.limits_or(SEARCHED_M)
 }
 
 /// Readings drawn evenly from the joint ranges; from the inner full turn where a joint has more.
 pub fn random_readings(limits: &[(f64, f64)], kinds: &[JointKind], rng: &mut impl Rng) -> Vec<f64> {
-    let draw = |(&(low, high), kind): (&(f64, f64), &JointKind)| {
-        let turn = std::f64::consts::PI;
-        let (low, high) = if *kind == JointKind::Prismatic { (low, high) } else { (low.max(-turn), high.min(turn)) };
+    let draw = |(limits, kind): (&(f64, f64), &JointKind)| {
+        let (low, high) = kind.inner_turn(*limits);
         if high > low { rng.random_range(low..high) } else { low }
     };
     limits.iter().zip(kinds).map(draw).collect()

@@ -11,7 +11,7 @@ use crate::linalg::median;
 use crate::plan::candidates::{Candidate, CandidateCounts, CandidateOptions, Search, candidates, workspace};
 use crate::plan::criterion::Criterion;
 use crate::plan::information::{Identified, candidate_information, flange_weight, stop_information};
-use crate::plan::order::{Leg, imbalance, tour};
+use crate::plan::order::{Leg, imbalance, leg_across, tour};
 use crate::plan::refine::{Refined, Refinement};
 use crate::plan::relax::{Design, NoDesign};
 use crate::plan::rounding::round;
@@ -231,26 +231,7 @@ pub(super) fn criterion(demand: &Demand, layout: &Layout, weight: &DMatrix<f64>)
         Demand::Named(names) => {
             let mut b = DMatrix::zeros(layout.len(), 0);
             for name in names {
-                let wanted: Vec<usize> = (0..robot)
-                    .filter(|&k| layout.columns[k].name.trim_start_matches("robot/").starts_with(name.as_str()))
-                    .collect();
-                if wanted.is_empty() {
-                    let known = layout.columns[..robot].iter().map(|c| c.name.trim_start_matches("robot/"));
-                    let joint = |column: &'_ str| column.split(['/', '.']).next().unwrap_or_default().to_owned();
-                    let joints: Vec<String> = known.clone().map(joint).collect();
-                    let names = joints.iter().map(String::as_str).chain(known.clone());
-                    let closest = crate::error::closest_name(name, names);
-                    let remedy = match closest {
-                        Some(c) => format!("did you mean \"{c}\"?"),
-                        None => format!("give a joint or one of {}", known.take(8).collect::<Vec<_>>().join(", ")),
-                    };
-                    return Err(Error::new(
-                        Code::ParameterUnknown,
-                        "--parameters",
-                        format!("there is no parameter \"{name}\""),
-                        remedy,
-                    ));
-                }
+                let wanted = layout.named_within(0..robot, "--parameters", name)?;
                 for k in wanted {
                     b = b.insert_column(0, 0.0);
                     b[(k, 0)] = 1.0 / layout.columns[k].prior_sigma;
@@ -292,14 +273,22 @@ fn rows(budget: &Budget, pool: &[Candidate], drawn: usize, placements: usize) ->
 }
 
 fn legs(pool: &[Candidate], chosen: &[usize], scene: &Scene, placements: usize) -> Vec<Leg> {
-    let mut all = Vec::new();
+    let mut all: Vec<Leg> = Vec::new();
+    let spare = |places: &[usize]| {
+        let there = pool.iter().filter(|c| places.contains(&c.placement));
+        there.map(|c| c.readings.clone()).collect::<Vec<_>>()
+    };
     for placement in 0..placements {
         let here: Vec<usize> = chosen.iter().copied().filter(|&k| pool[k].placement == placement).collect();
         let stops: Vec<Vec<f64>> = here.iter().map(|&k| pool[k].readings.clone()).collect();
-        let spare: Vec<Vec<f64>> =
-            pool.iter().filter(|c| c.placement == placement).map(|c| c.readings.clone()).collect();
-        let part = tour(&stops, scene, placement, &spare);
-        all.extend(part.into_iter().map(|leg| Leg { stop: here[leg.stop], ..leg }));
+        let part = tour(&stops, scene, placement, &spare(&[placement]));
+        let mut part: Vec<Leg> = part.into_iter().map(|leg| Leg { stop: here[leg.stop], ..leg }).collect();
+        if let Some((last, first)) = all.last().zip(part.first_mut()) {
+            let [from, to] = [last.stop, first.stop].map(|k| &pool[k]);
+            let places = [from.placement, placement];
+            *first = leg_across(first.stop, [&from.readings, &to.readings], scene, places, &spare(&places));
+        }
+        all.extend(part);
     }
     all
 }
@@ -323,7 +312,7 @@ fn no_plan(reason: NoDesign, request: &PlanRequest, pool: usize) -> Error {
             Code::PlanUndetermined,
             "plan",
             "the information of the candidates is not positive definite",
-            "check --pixel-sigma-px and --joint-noise-mrad, and the size of the plate",
+            "check --pixel-noise-px and --joint-noise-mrad, and the size of the plate",
         ),
     }
 }

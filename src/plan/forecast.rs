@@ -9,7 +9,7 @@ use crate::error::{Code, Error, Result};
 use crate::linalg::SymmetricFactor;
 use crate::plan::criterion::Criterion;
 use crate::plan::setting::{PlannedStop, Setting};
-use crate::problem::Adjustment;
+use crate::problem::{Adjustment, names};
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
@@ -287,9 +287,9 @@ fn scale_word(plan: &Plan, covariance: &DMatrix<f64>, flange: f64) -> Option<Str
 /// # Errors
 /// Names the parameter, how far its joint moves, and what to change.
 pub fn check_demand(request: &PlanRequest, forecast: &Forecast) -> Result<()> {
-    let Demand::Named(names) = &request.demand else { return Ok(()) };
-    for name in names {
-        let asked: Vec<&ParameterForecast> = forecast.parameters.iter().filter(|p| p.name.starts_with(name)).collect();
+    let Demand::Named(wanted) = &request.demand else { return Ok(()) };
+    for name in wanted {
+        let asked: Vec<&ParameterForecast> = forecast.parameters.iter().filter(|p| names(name, &p.name)).collect();
         if asked.iter().any(|p| p.share_of_data() > LEAST_SHARE) {
             continue;
         }

@@ -31,11 +31,16 @@ pub fn motion(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
 }
 
-/// For each joint: approaches from below less those from above, over their number (0 is balanced, 1 is one-sided).
+/// For each joint: approaches from below less those from above, over their number (0 is balanced, 1 is one-sided). One that stands still is not
+/// approached.
 pub fn imbalance(stops: &[&[f64]]) -> Vec<f64> {
     let joints = stops.first().map_or(0, |s| s.len());
-    let steps = stops.len().saturating_sub(1).max(1) as f64;
-    (0..joints).map(|j| stops.windows(2).map(|w| (w[1][j] - w[0][j]).signum()).sum::<f64>().abs() / steps).collect()
+    let of = |j: usize| {
+        let steps = stops.windows(2).map(|w| w[1][j] - w[0][j]).filter(|step| *step != 0.0);
+        let (sum, count) = steps.fold((0.0, 0), |(sum, count), step| (sum + step.signum(), count + 1));
+        sum.abs() / f64::from(count.max(1))
+    };
+    (0..joints).map(of).collect()
 }
 
 /// A tour through all stops (readings) of one placement; `spare` are free postures that may be passed on the way.
@@ -59,10 +64,29 @@ pub fn tour(stops: &[Vec<f64>], scene: &Scene, placement: usize, spare: &[Vec<f6
         if is_free[before][stop] {
             return Leg { stop, via: Vec::new(), is_free: true };
         }
-        let detour = detour(&stops[before], &stops[stop], scene, placement, spare);
-        Leg { stop, is_free: detour.is_some(), via: detour.into_iter().collect() }
+        past(stop, detour([&stops[before], &stops[stop]], scene, &[placement], spare))
     });
     legs.collect()
+}
+
+/// The leg between stops (readings) of two placements, free with the plate at either: it is moved on the way.
+pub fn leg_across(stop: usize, ends: [&[f64]; 2], scene: &Scene, placements: [usize; 2], spare: &[Vec<f64>]) -> Leg {
+    // The plate is put down in front of an arm that stands at the stop before.
+    let is_placed = scene.collision(ends[0], placements[1]).is_none();
+    if is_placed && is_free_at(ends, scene, &placements) {
+        return Leg { stop, via: Vec::new(), is_free: true };
+    }
+    past(stop, detour(ends, scene, &placements, spare))
+}
+
+/// The leg past an intermediate posture; one to be taught where there is none.
+fn past(stop: usize, detour: Option<Vec<f64>>) -> Leg {
+    Leg { stop, is_free: detour.is_some(), via: detour.into_iter().collect() }
+}
+
+/// Whether the straight way is free with the plate at each of these placements.
+fn is_free_at([from, to]: [&[f64]; 2], scene: &Scene, placements: &[usize]) -> bool {
+    placements.iter().all(|&placement| scene.way_is_free(from, to, placement, CHECK_STEP))
 }
 
 fn nearest_neighbours(cost: &[Vec<f64>]) -> Vec<usize> {
@@ -113,13 +137,30 @@ fn improved(mut order: Vec<usize>, stops: &[Vec<f64>], cost: &[Vec<f64>]) -> Vec
     order
 }
 
-fn detour(from: &[f64], to: &[f64], scene: &Scene, placement: usize, spare: &[Vec<f64>]) -> Option<Vec<f64>> {
+fn detour([from, to]: [&[f64]; 2], scene: &Scene, placements: &[usize], spare: &[Vec<f64>]) -> Option<Vec<f64>> {
     let mut ranked: Vec<(f64, &Vec<f64>)> = spare.iter().map(|s| (motion(from, s) + motion(s, to), s)).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
     let open = |s: &[f64]| {
-        scene.collision(s, placement).is_none()
-            && scene.way_is_free(from, s, placement, CHECK_STEP)
-            && scene.way_is_free(s, to, placement, CHECK_STEP)
+        placements.iter().all(|&placement| scene.collision(s, placement).is_none())
+            && is_free_at([from, s], scene, placements)
+            && is_free_at([s, to], scene, placements)
     };
     ranked.into_iter().take(DETOURS).map(|(_, s)| s).find(|s| open(s)).cloned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_that_stands_still_is_approached_from_no_side() {
+        let stops: [&[f64]; 5] = [
+            &[0.0, 0.3, 0.0, 0.0],
+            &[1.0, 0.3, 0.0, 1.0],
+            &[0.5, 0.3, 0.2, 2.0],
+            &[0.7, 0.3, 0.0, 3.0],
+            &[0.9, 0.3, 0.0, 4.0],
+        ];
+        assert_eq!(imbalance(&stops), [0.5, 0.0, 0.0, 1.0]);
+    }
 }

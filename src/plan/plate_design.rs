@@ -23,6 +23,10 @@ const SIDE_STRIP_M: f64 = 0.013;
 /// Height of the strips above and below the quiet zone, for scale bar and text, m.
 pub const TEXT_STRIP_M: f64 = 0.023;
 
+/// Markers at most that a code is searched for.
+const MOST_MARKERS: u64 = 5000;
+/// Rows at most that a number of markers is divided into.
+const MOST_SIDE: u32 = 5000;
 /// Single-cell changes tried for each further cell of distance.
 const TRIES: usize = 6000;
 const DEFAULT_SHAPE: (u32, u32) = (28, 18);
@@ -225,11 +229,11 @@ fn shape(request: &PlateRequest) -> Result<(u32, u32)> {
             "ask for at least 5 x 4 markers",
         ));
     }
-    if columns * rows > 5000 {
+    if u64::from(columns) * u64::from(rows) > MOST_MARKERS {
         return Err(Error::new(
             Code::PlateImpossible,
             "plate",
-            format!("{columns} x {rows} markers are more than the code search handles (5000)"),
+            format!("{columns} x {rows} markers are more than the code search handles ({MOST_MARKERS})"),
             "ask for fewer markers with a larger pitch",
         ));
     }
@@ -244,7 +248,7 @@ fn shape_of_count(count: u32, sheet_m: Option<[f64; 2]>) -> (u32, u32) {
         let miss = (columns * f64::from(rows) / f64::from(count) - 1.0).abs();
         (10.0 * miss + (columns / f64::from(rows) / proportion).ln().abs(), columns as u32)
     };
-    let best = (1..=count.max(1)).min_by(|&a, &b| cost(a).0.total_cmp(&cost(b).0)).unwrap_or(1);
+    let best = (1..=count.clamp(1, MOST_SIDE)).min_by(|&a, &b| cost(a).0.total_cmp(&cost(b).0)).unwrap_or(1);
     (cost(best).1, best)
 }
 
@@ -394,6 +398,17 @@ mod tests {
         let request = PlateRequest { shape: Some((14, 9)), viewing: Some(viewing()), ..PlateRequest::default() };
         let made = design(&request).unwrap();
         assert!(made.least_minor_axis_px.unwrap() >= LEAST_MINOR_AXIS_PX);
+    }
+
+    #[test]
+    fn more_markers_than_a_code_can_have_are_refused() {
+        let of = |shape: Option<(u32, u32)>, markers: Option<u32>| {
+            design(&PlateRequest { shape, markers, ..PlateRequest::default() }).unwrap_err().code
+        };
+        for shape in [(65536, 65536), (u32::MAX, u32::MAX), (1000, 6)] {
+            assert_eq!(of(Some(shape), None), Code::PlateImpossible, "{shape:?}");
+        }
+        assert_eq!(of(None, Some(u32::MAX)), Code::PlateImpossible);
     }
 
     #[test]

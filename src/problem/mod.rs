@@ -61,7 +61,7 @@ pub use postures::{JOINTS_IN_COMMON, joined, posture_groups, related_readings};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};
 pub use restraint::{JointPrior, Restraint};
 pub use rounding::Rounding;
-pub use select::short_name;
+pub use select::{names, short_name};
 pub use shared::Shared;
 pub use state::State;
 pub use step::Step;

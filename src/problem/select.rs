@@ -3,6 +3,8 @@
 //! `joint_2.offset`, `robot/joint_2.offset` and `robot.joint_2.offset` are the same; `joint_3.origin` means all six numbers of it;
 //! `camera.front.k3` needs no `lens`; `*` stands for any letters (`*.cos_1`).
 
+use std::ops::Range;
+
 use super::Layout;
 use crate::error::{Code, Error, Result, closest_name};
 
@@ -20,7 +22,7 @@ pub fn short_name(column: &str) -> String {
 }
 
 /// True where `pattern` names `column` itself, a block that it belongs to, or fits by its `*`.
-fn names(pattern: &str, column: &str) -> bool {
+pub fn names(pattern: &str, column: &str) -> bool {
     let pattern = pattern.replace('/', ".");
     [column.replace('/', "."), short_name(column)].iter().any(|name| {
         let block = name.strip_prefix(pattern.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
@@ -42,11 +44,19 @@ impl Layout {
     /// # Errors
     /// A name that fits no column, with the closest ones; `place` says where the name stands.
     pub fn named(&self, place: &str, pattern: &str) -> Result<Vec<usize>> {
-        let found: Vec<usize> = (0..self.len()).filter(|&c| names(pattern, &self.columns[c].name)).collect();
+        self.named_within(0..self.len(), place, pattern)
+    }
+
+    /// The same among some columns.
+    ///
+    /// # Errors
+    /// As [`Layout::named`].
+    pub fn named_within(&self, columns: Range<usize>, place: &str, pattern: &str) -> Result<Vec<usize>> {
+        let found: Vec<usize> = columns.clone().filter(|&c| names(pattern, &self.columns[c].name)).collect();
         if !found.is_empty() {
             return Ok(found);
         }
-        let known: Vec<String> = self.columns.iter().map(|c| short_name(&c.name)).collect();
+        let known: Vec<String> = self.columns[columns].iter().map(|c| short_name(&c.name)).collect();
         let remedy = proposals(pattern, &known);
         Err(Error::new(Code::ParameterUnknown, place, format!("there is no parameter '{pattern}'"), remedy))
     }

@@ -1,13 +1,15 @@
 //! Reading a series folder.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::collections::BTreeSet;
+use std::path::{Component, Path, PathBuf};
 
 use super::controller_file;
 use super::controller_poses::ControllerPoses;
 use super::image_file;
+use super::image_folder::{by_name, image_files, other_files};
 use super::inputs::InputFile;
 use super::joints::{SeriesStop, StopKey, Stops};
+use super::light::{Light, lights_of, unused_light};
 use super::manifest::{Manifest, StopOrder};
 use super::measurement_series::{Series, Source, file_name, own_manifest};
 use super::observation_file;
@@ -18,12 +20,10 @@ use super::rotation_kind::RotationKind;
 use super::run::Run;
 use super::spatial::SpatialFiles;
 use super::stop_index::StopIndex;
-use super::table::{Table, composed};
+use super::table::Table;
 use super::views::{CameraView, Seen, has_mixed_mounts};
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::files;
-
-const IMAGE_EXTENSIONS: [&str; 9] = ["png", "tif", "tiff", "pgm", "pnm", "ppm", "jpg", "jpeg", "bmp"];
 
 /// What to do with images of other formats.
 const CONVERT: &str = "convert the images to png, tif, pgm, jpg or bmp, and name them so in the table";
@@ -114,7 +114,9 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
             observed(&path, &manifest, &plate, &stops, &mut inputs, &mut notices)?
         } else if is_seen {
             let lines: Vec<u64> = stops.stops.iter().map(|s| s.line).collect();
-            pictured(&folder.join("images"), (&table, &lines), &mut stops, &mut notices)?
+            let images = folder.join("images");
+            let light = Light::of(&[&images, folder])?;
+            pictured((&images, light), (&table, &lines), &mut stops, &mut notices)?
         } else {
             Source::NoImages
         }
@@ -168,8 +170,15 @@ fn views_of(series: &mut Series, use_observations: bool) -> Result<Vec<Series>> 
         require_names_of_their_own(&path, &views)?;
     }
     let mut inputs = Vec::new();
-    let views = views.into_iter().map(|view| one_view(series, &path, view, use_observations, &mut inputs));
+    let folders: Vec<PathBuf> = views.iter().map(|view| view.images.clone()).collect();
+    let views = views.into_iter().zip(&folders).map(|(view, images)| {
+        let light = lights_of(images, &folders, folder);
+        one_view(series, &path, (view, &light), use_observations, &mut inputs)
+    });
     let views = views.collect::<Result<Vec<_>>>()?;
+    if !use_observations {
+        series.notices.extend(unused_light(series, &folders, &views));
+    }
     series.inputs.extend(inputs);
     series.inputs.dedup();
     Ok(views)
@@ -192,7 +201,7 @@ fn require_names_of_their_own(table: &Path, views: &[CameraView]) -> Result<()> 
 fn one_view(
     series: &Series,
     table: &Path,
-    view: CameraView,
+    (view, light): (CameraView, &[&Path]),
     use_observations: bool,
     inputs: &mut Vec<InputFile>,
 ) -> Result<Series> {
@@ -208,7 +217,7 @@ fn one_view(
         let path = series.folder.join("observations.csv");
         observed(&path, &manifest, &series.plate, &stops, inputs, &mut Vec::new())?
     } else {
-        pictured(&images, (table, &lines), &mut stops, &mut notices)?
+        pictured((&images, Light::of(light)?), (table, &lines), &mut stops, &mut notices)?
     };
     let has_mixed_mounts = has_mixed_mounts(&series.manifest);
     let run = Some(Run { name: series.name.clone(), has_mixed_mounts, rows });
@@ -300,7 +309,7 @@ fn observed(
 
 /// Finds the image of every stop, which a table names in these lines, and tells of images without one.
 fn pictured(
-    images: &Path,
+    (images, light): (&Path, Light),
     (csv, lines): (&Path, &[u64]),
     stops: &mut Stops,
     notices: &mut Vec<Notice>,
@@ -315,8 +324,9 @@ fn pictured(
     let mut missing = Vec::new();
     for (stop, line) in stops.stops.iter_mut().zip(lines) {
         // What is no image by its name is looked at like one: what is wrong with it is said of it then.
-        match on_disk.get(&stop.image).or_else(|| others_on_disk.get(&stop.image)) {
-            Some(path) => stop.path = Some(path.clone()),
+        let directly = on_disk.get(&stop.image).or_else(|| others_on_disk.get(&stop.image)).cloned();
+        match directly.or_else(|| within(images, &stop.image)) {
+            Some(path) => stop.path = Some(path),
             None => missing.push((*line, stop.image.clone())),
         }
     }
@@ -350,8 +360,14 @@ fn pictured(
     let named: BTreeSet<&str> = stops.stops.iter().map(|s| s.image.as_str()).collect();
     let unnamed: Vec<String> = names.iter().filter(|n| !named.contains(n.as_str())).cloned().collect();
     notices.extend((!unnamed.is_empty()).then(|| unlisted(images, csv, &unnamed)));
-    let (dark, white) = optional_images(images.parent().unwrap_or(images))?;
+    let Light { dark, white } = light;
     Ok(Source::Images { folder: images.to_path_buf(), dark, white })
+}
+
+/// The file in a folder below that of the images.
+fn within(images: &Path, name: &str) -> Option<PathBuf> {
+    let is_below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    Some(images.join(name)).filter(|path| is_below && path.is_file())
 }
 
 /// Images that no row of the table names.
@@ -368,46 +384,6 @@ fn name_image(stop: &mut SeriesStop, names: &BTreeSet<String>) {
     if let Some(file) = names.iter().find(is_its_own).filter(|_| !names.contains(&stop.image)) {
         stop.image.clone_from(file);
     }
-}
-
-/// Images in dark/ and white/, where there are any.
-pub(super) fn optional_images(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
-    let optional = |name: &str| {
-        let path = folder.join(name);
-        if path.is_dir() { image_files(&path) } else { Ok(Vec::new()) }
-    };
-    Ok((optional("dark")?, optional("white")?))
-}
-
-/// Image files of a folder in the order of their names.
-pub(super) fn image_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, &e))?;
-    let mut files = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(|e| Error::io(folder, &e))?.path();
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let hidden = file_name(&path).starts_with('.');
-        if extension.is_some_and(|e| IMAGE_EXTENSIONS.contains(&e.as_str())) && !hidden {
-            plain_name("image", &file_name(&path), folder.display())?;
-            files.push(path);
-        }
-    }
-    files.sort();
-    Ok(files)
-}
-
-/// Names of the files of a folder that are no images by their names.
-fn other_files(folder: &Path, images: &BTreeSet<String>) -> Result<BTreeMap<String, PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, &e))?;
-    let paths = entries.map(|entry| entry.map(|e| e.path()).map_err(|e| Error::io(folder, &e)));
-    let paths = paths.collect::<Result<Vec<PathBuf>>>()?;
-    let all = by_name(paths.into_iter().filter(|p| p.is_file()).collect());
-    Ok(all.into_iter().filter(|(name, _)| !images.contains(name)).collect())
-}
-
-/// Files by their names as tables have them.
-fn by_name(files: Vec<PathBuf>) -> BTreeMap<String, PathBuf> {
-    files.into_iter().map(|path| (composed(&file_name(&path)).into_owned(), path)).collect()
 }
 
 /// A name on disk that differs by case or extension only.

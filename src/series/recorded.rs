@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::camera_section::CameraMount;
+use super::light::Light;
 use super::manifest::{AngleUnit, Manifest};
 use super::measurement_series::{Series, Source, file_name};
-use super::read::{manifest_beside, optional_images};
+use super::read::manifest_beside;
 use super::recording::{CameraInfo, Extracted, RecordingOptions, extract};
 use crate::error::{Code, Error, Notice, Result};
 
@@ -20,7 +21,7 @@ impl Series {
         let joint_unit = self.manifest.joint_unit.or(options.joint_unit);
         let options = RecordingOptions { joint_unit, ..options.clone() };
         let extracted = extract(recording, images, &options)?;
-        let (dark, white) = optional_images(&self.folder)?;
+        let Light { dark, white } = Light::of(&[&self.folder])?;
         let written = self.manifest_file();
         self.manifest.joint_unit = joint_unit;
         self.source = Source::Images { folder: images.to_path_buf(), dark, white };

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::joints::Stops;
 use super::manifest::AngleUnit;
 use crate::error::{Code, Error, Notice, Result};
-use crate::urdf::{Chain, Joint, JointKind};
+use crate::urdf::{Chain, JointKind};
 
 /// No joint of an arm turns further than two full turns from zero on most of its stops.
 const TWO_TURNS_RAD: f64 = 4.0 * std::f64::consts::PI;
@@ -88,14 +88,9 @@ fn to_si(chain: &Chain, unit: AngleUnit, raw: &[f64]) -> Vec<f64> {
     raw.iter().zip(&chain.reading_kinds).map(si).collect()
 }
 
-/// The joint of the chain that a reading moves directly.
-fn own_joint(chain: &Chain, reading: usize) -> Option<&Joint> {
-    chain.joints.iter().find(|j| j.name == chain.readings[reading])
-}
-
-/// Limits of a reading, where its joint lies in the chain and states them.
+/// Limits of a reading, where they are stated.
 fn limits(chain: &Chain, reading: usize) -> Option<(f64, f64)> {
-    own_joint(chain, reading)?.limits
+    chain.stated_limits()[reading]
 }
 
 fn revolute(chain: &Chain) -> impl Iterator<Item = usize> + Clone + '_ {

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use roxmltree::Node;
+
 use super::elements::escaped;
 use super::patch::join;
 use super::read::{elements, parse, without_undeclared_prefixes};
@@ -48,9 +50,7 @@ pub fn add_links(text: &str, links: &[AddedLink]) -> Result<String> {
              <origin xyz=\"{xyz}\" rpy=\"{rpy}\"/>\n  </joint>\n"
         );
     }
-    let end = robot.range().end;
-    let at = text[..end].rfind("</").filter(|at| text[*at..end].trim_end().ends_with('>'));
-    let Some(at) = at.filter(|_| robot.has_children()) else {
+    let Some(at) = closing_tag(text, robot) else {
         return Err(Error::new(
             Code::UrdfLayout,
             "URDF",
@@ -63,4 +63,11 @@ pub fn add_links(text: &str, links: &[AddedLink]) -> Result<String> {
     let at = if text[..line].ends_with('\n') { line } else { at };
     let before = if text[..at].ends_with('\n') { "" } else { "\n" };
     Ok(format!("{}{before}{added}{}", &text[..at], &text[at..]))
+}
+
+/// Where the last tag of the robot begins; `None` where it is an empty element.
+pub(super) fn closing_tag(text: &str, robot: Node<'_, '_>) -> Option<usize> {
+    let end = robot.range().end;
+    let at = text[..end].rfind("</").filter(|at| text[*at..end].trim_end().ends_with('>'));
+    at.filter(|_| robot.has_children())
 }

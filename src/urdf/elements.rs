@@ -15,6 +15,13 @@ const KNOWN_CHILDREN: [&str; 9] =
     ["origin", "parent", "child", "axis", "limit", "mimic", "calibration", "dynamics", "safety_controller"];
 /// Five turns, rad: no wrist with stops turns farther.
 const MOST_RADIANS: f64 = 10.0 * std::f64::consts::PI;
+/// Range of a joint that states no limits to both sides of zero, rad.
+pub const UNLIMITED_RAD: f64 = std::f64::consts::PI;
+/// Range of a slide that states none to both sides of zero, m.
+pub const UNLIMITED_M: f64 = 0.5;
+/// How far from zero a reading of such a slide is looked for, m.
+pub const SEARCHED_M: f64 = 3.0;
+
 /// Two turns, degrees; what is larger says that there is no limit.
 const MOST_DEGREES: f64 = 720.0;
 const TYPES: [&str; 7] = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical"];
@@ -289,8 +296,8 @@ fn limits(
 /// What counts as the range of a joint that states none.
 fn unlimited(read: &urdf_rs::Joint, place: String) -> Notice {
     let range = match read.joint_type {
-        JointType::Prismatic => "0.5 m (3.14 m where a posture is looked for)",
-        _ => "half a turn",
+        JointType::Prismatic => format!("{UNLIMITED_M} m ({SEARCHED_M} m where a posture is looked for)"),
+        _ => "half a turn".to_owned(),
     };
     let what = format!(
         "states no limits, which URDF demands of it: where its range counts, {range} to both sides of zero is taken"

@@ -5,8 +5,9 @@ use std::ops::Range;
 
 use roxmltree::Node;
 
+use super::added_links::closing_tag;
 use super::elements::escaped;
-use super::read::{RobotDescription, parse};
+use super::read::{RobotDescription, parse, without_undeclared_prefixes};
 use crate::error::{Code, Error, Notice, Result};
 
 /// Name of the fixed joint from the base of one arm to that of the other; its origin is estimated from wherever it starts.
@@ -47,7 +48,9 @@ impl RobotDescription {
             escaped(&format!("{prefix}{}", second.only_root()?))
         );
         let elements = taken(second, prefix)?;
-        let end = self.text.rfind("</").ok_or_else(|| unjoined(self, "has no end of <robot>"))?;
+        let plain = without_undeclared_prefixes(&self.path, &self.text)?;
+        let end = closing_tag(&self.text, parse(&self.path, &plain)?.root_element());
+        let end = end.ok_or_else(|| unjoined(self, "has no end of <robot>"))?;
         let text = format!("{}{elements}{joined}{}", &self.text[..end], &self.text[end..]);
         let mut both = Self::from_text(&self.path, text)?;
         both.notices.extend(second.notices.iter().cloned());
@@ -70,7 +73,8 @@ fn unjoined(description: &RobotDescription, what: &str) -> Error {
 /// Text of the links and joints of a description, their names with a prefix.
 fn taken(description: &RobotDescription, prefix: &str) -> Result<String> {
     let text = &description.text;
-    let document = parse(&description.path, text)?;
+    let plain = without_undeclared_prefixes(&description.path, text)?;
+    let document = parse(&description.path, &plain)?;
     let mut all = String::new();
     for element in document.root_element().children().filter(|n| TAKEN.contains(&n.tag_name().name())) {
         let mut names: Vec<Range<usize>> = element.descendants().filter_map(name_in).collect();

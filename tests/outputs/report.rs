@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 use crate::outputs_support::{context, robot, solved};
 use robotcal::assess::{Bearer, Pattern, PatternTest};
 use robotcal::diagnose::{
-    DoubtedSize, ExchangedReadings, Finding, GivenCamera, InOrder, LensNotInRos, OddImage, ResidualPattern, SmallGain,
-    ToldBy, Weight,
+    DoubtedSize, ExchangedReadings, Finding, GivenCamera, InOrder, LensNotInRos, MarkerOff, OddImage, ResidualPattern,
+    SmallGain, ToldBy, Weight,
 };
 use robotcal::error::{Code, Notice};
 use robotcal::identify::{Estimator, RobotModel, beside_two_stages};
@@ -163,8 +163,15 @@ fn the_verdict_follows_the_gates_and_then_the_doubts() {
 }
 
 #[test]
+fn of_several_plates_that_of_a_marker_is_named() {
+    let place = |plate: Option<String>| Finding::from(MarkerOff { marker: 3, plate, distance_m: 1e-3 }).notice().place;
+    assert_eq!([place(None), place(Some("plate 2".into()))], ["marker 3", "marker 3 of plate 2"]);
+}
+
+#[test]
 fn what_was_seen_and_what_to_do_stay_apart() {
     let found = Finding::from(DoubtedSize::Contradicted {
+        plate: "plate".into(),
         measured: false,
         off: 0.02,
         sigma: 0.001,
@@ -258,6 +265,7 @@ fn a_pattern_that_was_found_is_said_beside_how_often_larger_ones_are() {
 #[test]
 fn rows_that_were_exchanged_are_put_right_before_a_failed_result_is_tried_again() {
     let doubted = DoubtedSize::Contradicted {
+        plate: "plate".into(),
         measured: false,
         off: 0.02,
         sigma: 0.001,

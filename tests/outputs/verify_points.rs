@@ -149,6 +149,25 @@ fn a_point_that_misses_what_is_stated_of_the_model_there_does_not_stand_out() {
     assert_eq!(odd_points(&robot, &seen, &stated_m, &limits), None);
 }
 
+/// Of two points far from all others the bad one draws the good one along, whose place the others tell.
+#[test]
+fn a_good_point_is_not_left_out_with_the_bad_one_beside_it() {
+    let ((_, robot), limits) = (kr6(), Limits::default());
+    let on_tip = [0.03, -0.02, 0.1].into();
+    let mut seen = points(&robot, 26, 0.0);
+    for (k, point) in seen.iter_mut().enumerate() {
+        let far = if k < 24 { [0.0; 6] } else { [1.6, 0.4, -0.5, 0.7, 0.6, 0.9] };
+        for (reading, far) in point.readings.iter_mut().zip(far) {
+            *reading = 0.15 * *reading + far;
+        }
+        point.position_m = robot.base_from_tip(&point.readings).transform(&on_tip);
+    }
+    seen[25].position_m += Vector3::new(2e-3, -3e-3, 4e-3);
+    let odd = odd_points(&robot, &seen, &[], &limits).unwrap();
+    assert_eq!(odd.points, [25]);
+    assert!(odd.without.rms_m < 1e-9, "{odd:?}");
+}
+
 /// A robot whose first joint is mounted off its axis, rad.
 fn eccentric(robot: &Robot) -> Robot {
     let mut own = robot.clone();

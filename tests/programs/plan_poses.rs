@@ -543,6 +543,45 @@ fn the_planned_programs_stop_where_no_straight_way_is_free() {
     assert_eq!((pauses, stops(&chosen, "trajectory.yaml", "teach:").len()), (0, 1));
 }
 
+/// Between two places of the plate stands a wall: the way past it has to be taught.
+#[test]
+fn the_way_from_one_place_of_the_plate_to_the_next_is_looked_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let plate = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/kr6_small/plate.toml");
+    let (urdf, out) = (urdf("ur10e"), folder.path().join("plan"));
+    let files = ["--urdf", urdf.to_str().unwrap(), "--plate", plate.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    let few = ["plan", "--count", "6", "--candidates", "60", "--rounds", "0", "--per-placement", "4"];
+    let places = ["--plate-pose", "0.5,0.45,0,0,0,0", "--plate-pose", "0.5,-0.45,0,0,0,0"];
+    let wall = ["--box", "0.75,0,0.5,0.9,0.04,1.2"];
+    let (code, _, error) = run(&[&few[..], &files, &places, &wall].concat());
+    assert_eq!(code, 0, "{error}");
+    let plan: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("plan.json")).unwrap()).unwrap();
+    let stops = plan["stops"].as_array().unwrap();
+    let moves = stops.windows(2).filter(|pair| pair[0]["placement"] != pair[1]["placement"]);
+    assert_eq!(moves.map(|pair| pair[1]["way_is_free"].as_bool()).collect::<Vec<_>>(), [Some(false)]);
+}
+
+/// A name means what it means for `identify --free`: a parameter, a block, or what fits its stars.
+#[test]
+fn parameters_are_named_in_planning_as_in_identify() {
+    let asked = |name: &str| {
+        let request = PlanRequest {
+            demand: Demand::Named(vec![name.to_owned()]),
+            candidates: CandidateOptions { count: 30, ..CandidateOptions::default() },
+            budget: Budget::default(),
+            rounds: 0,
+            ..request("ur10e", 4)
+        };
+        choose(&request).map(|choice| choice.chosen.len()).map_err(|error| error.code)
+    };
+    for name in ["elbow_joint", "robot/elbow_joint/origin.rx", "*.rx"] {
+        assert_eq!(asked(name), Ok(4), "{name}");
+    }
+    for name in ["elbow", "elbow_joint/origin.r", "camera", "*.focal"] {
+        assert_eq!(asked(name), Err(Code::ParameterUnknown), "{name}");
+    }
+}
+
 #[test]
 fn names_cannot_become_statements_of_the_planned_programs() {
     let mut request = request("ur10e", 4);

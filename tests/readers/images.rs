@@ -68,6 +68,55 @@ fn what_was_measured_in_space_is_a_view_of_the_same_stops_without_images() {
     assert_eq!(series.image_hashes().unwrap().len(), 5);
 }
 
+/// Dark and white images of a view.
+fn light(view: &Series) -> [usize; 2] {
+    let Source::Images { dark, white, .. } = &view.source else { panic!("{:?}", view.source) };
+    [dark.len(), white.len()]
+}
+
+#[test]
+fn dark_and_white_images_of_every_camera_are_its_own() {
+    let own = [("images/left/dark/1.png", ""), ("images/left/white/1.png", ""), ("images/white/2.png", "")];
+    let common = [("dark/1.png", ""), ("white/1.png", ""), ("white/2.png", "")];
+    let folder = folder(&[&own[..], &common].concat());
+    let series = read(folder.path()).unwrap();
+    let [left, wrist] = series.views() else { panic!("{} views", series.views().len()) };
+    assert_eq!([light(left), light(wrist)], [[1, 1], [0, 0]]);
+    let unused: Vec<&Notice> = series.notices.iter().filter(|n| n.code == Code::FlatFieldUnused).collect();
+    let places: Vec<String> =
+        unused.iter().map(|n| n.place.replace(&folder.path().display().to_string(), "")).collect();
+    assert_eq!(places, ["/dark", "/white", "/images/white"]);
+}
+
+/// Of one camera they are its own wherever its images lie.
+#[test]
+fn dark_and_white_images_of_a_series_are_those_of_its_only_camera() {
+    let manifest = MANIFEST
+        .split("[[camera]]")
+        .take(2)
+        .collect::<Vec<_>>()
+        .join("[[camera]]")
+        .replace("name = \"left\"", "name = \"left\"\nimages = \"images/left\"");
+    let images = "stop,image\none,a.png\nthree,c.png\n";
+    let light_of_all = [("dark/1.png", ""), ("white/1.png", ""), ("white/2.png", "")];
+    let folder = folder(&[&[("series.toml", manifest.as_str()), ("images.csv", images)][..], &light_of_all].concat());
+    let series = read(folder.path()).unwrap();
+    assert_eq!(light(&series.views()[0]), [1, 2]);
+    assert!(!series.notices.iter().any(|n| n.code == Code::FlatFieldUnused), "{:?}", series.notices);
+}
+
+#[test]
+fn an_image_may_lie_in_a_folder_below() {
+    let table = IMAGES.replace("left,a.png", "left,first/a.png").replace("left,c.png", "left,../c.png");
+    let folder = folder(&[("images.csv", &table), ("images/left/first/a.png", ""), ("images/c.png", "")]);
+    let series = read(folder.path()).unwrap();
+    let left = &series.views()[0];
+    assert_eq!(seen(left), [(0, "first/a.png"), (2, "../c.png")]);
+    assert!(left.stops.stops[0].path.as_ref().unwrap().ends_with("images/left/first/a.png"));
+    assert_eq!(left.stops.stops[1].path, None);
+    assert!(left.notices.iter().any(|n| n.code == Code::ImageNotThere && n.what.contains("../c.png")));
+}
+
 #[test]
 fn a_bad_row_names_line_and_column() {
     let with = |from: &str, to: &str| refusal("images.csv", &IMAGES.replace(from, to));

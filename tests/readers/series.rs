@@ -1,11 +1,11 @@
 //! Reading and writing series folders: what is accepted, what is refused, and with which code.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use robotcal::series::{
     AngleUnit, CameraMount, Edge, ImageObservations, Manifest, Observation, PlateKind, Series, SeriesStop, Source,
-    StopOrder, Stops, observations_csv, read, read_images,
+    StopOrder, Stops, observations_csv, read, read_images, series_of_images,
 };
 use robotcal::urdf::{Chain, RobotDescription};
 use robotcal::{Code, Error};
@@ -228,6 +228,14 @@ fn images_and_rows_are_held_against_each_other() {
     assert_says(&message, Code::ImageNotThere, &["joints.csv:2", "a.PNG", "3 of 3", "\"a.png\""]);
     let message = refusal(&[("joints.csv", &JOINTS.replace(".png", ""))]);
     assert_says(&message, Code::ImageNotThere, &["\"a.png\""]);
+}
+
+#[test]
+fn single_images_of_one_name_are_told_by_the_path_of_the_earlier() {
+    let folder = folder(&[("plate.toml", PLATE)]);
+    let images = ["a/x.png", "b/y.png", "c/x.png"].map(PathBuf::from);
+    let error = series_of_images(&images, &folder.path().join("plate.toml")).unwrap_err();
+    assert_says(&error, Code::ImageTwice, &["c/x.png", "a/x.png"]);
 }
 
 /// A file that is there and whose format is not read is not missing.

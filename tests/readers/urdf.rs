@@ -376,6 +376,21 @@ fn elements_under_an_undeclared_prefix_are_passed_over_and_kept() {
     assert_eq!(patched, text.replace("xyz=\"0 0 1\"", "xyz=\"0 0 1.5\""));
 }
 
+/// What the first arm may have, the second may have, too; and a remark behind the robot is no part of it.
+#[test]
+fn a_second_arm_may_have_what_the_first_may() {
+    let arm = wrap(&["a", "b"], &[joint("j", "revolute", "a", "b", "<origin xyz=\"0 0 1\"/>")]);
+    let marked = arm.replacen("<link name=\"a\"/>", "<link name=\"a\"><drake:mu value=\"1\"/></link>", 1);
+    let behind = "\n<!-- made of </parts> -->\n";
+    for (first, second) in [(&arm, &marked), (&marked, &arm), (&format!("{arm}{behind}"), &arm)] {
+        let (both, prefix) = robot(first).with_second(None, &robot(second)).unwrap();
+        let chain = both.chain(Some("robot_2_b"), Some("b")).unwrap();
+        assert_eq!((prefix, chain.readings), ("robot_2_", vec!["robot_2_j".to_owned(), "j".to_owned()]));
+        let file = both.text.as_str();
+        assert_eq!(file.ends_with(behind), first.ends_with(behind));
+    }
+}
+
 /// The parsers of ROS let a document type pass; what an entity stands for could not be corrected in its place.
 #[test]
 fn a_document_type_is_kept_and_its_entities_are_refused() {

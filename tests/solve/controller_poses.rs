@@ -15,6 +15,7 @@ use robotcal::model::inverse::{reading_limits, solve_from};
 use robotcal::model::robot::Robot;
 use robotcal::output::solution_json;
 use robotcal::plan::plate_design::{PlateRequest, design};
+use robotcal::problem::{MeasuredSeries, MeasuredStop, Shared};
 use robotcal::simulate::truth::Truth;
 use robotcal::simulate::{WorldRequest, series as simulated};
 use robotcal::study::measured;
@@ -495,11 +496,15 @@ fn the_images_tell_in_which_posture_a_pose_was_reached() {
     println!("nearest {nearest}, told {told} of {}", readings.len());
     assert!(nearest < readings.len() / 2 && told + 1 >= readings.len(), "{nearest}, {told}");
     assert!(solution.findings.iter().any(|f| f.code() == Code::PosturesByImages));
-    // Solved again from its file, the same is open.
+    the_same_is_open_in_its_file(&calibration);
+}
+
+/// Solved again from its solution.json.
+fn the_same_is_open_in_its_file(calibration: &Calibration) {
     let files = calibration.files(&Export::default()).unwrap();
-    let record = robotcal::output::solution_json::read(&files["solution.json"]).unwrap();
+    let record = solution_json::read(&files["solution.json"]).unwrap();
     let restored = robotcal::output::restore::measured_series(&record).unwrap();
-    assert_eq!(restored[0].postures, solution.series[0].postures);
+    assert_eq!(restored[0].postures, calibration.solution().series[0].postures);
     assert!(restored[0].readings_are_computed());
 }
 
@@ -552,6 +557,7 @@ fn a_tracker_tells_in_which_posture_a_pose_was_reached() {
         });
         let said = said.unwrap();
         assert_eq!((said.stops, said.others.len(), said.is_open), (all, told - nearest, false), "{said:?}");
+        the_same_is_open_in_its_file(&calibration);
     }
 }
 
@@ -584,9 +590,16 @@ fn a_wrist_turned_over_at_all_stops_is_told_to_be_open() {
     // The angles of one stop tell the side of the wrist at all of them.
     let mut stated = seen[0].clone();
     stated.postures[0].clear();
-    let by_one = identify(chain, &[stated], &Options::default()).unwrap();
+    let by_one = identify(chain.clone(), &[stated], &Options::default()).unwrap();
     let side = by_one.findings.iter().find(|f| f.code() == Code::PosturesByImages).unwrap();
     assert!(matches!(side, Finding::ComputedPostures(found) if !found.is_open && found.others.len() == 8), "{side}");
+    // What was read beside it, of older files without the other postures, goes with them.
+    let unseen = |s: &MeasuredStop| MeasuredStop { observations: Shared::default(), ..s.clone() };
+    let stops = seen[0].stops.iter().map(unseen).collect();
+    let beside = MeasuredSeries::without_images("beside", seen[0].order_known, stops);
+    let beside = MeasuredSeries { run: Some(seen[0].name.clone()), ..beside };
+    let both = identify(chain, &[seen[0].clone(), beside], &Options::default()).unwrap();
+    assert_eq!(both.series[1].stops[1].readings, both.series[0].stops[1].readings);
     // A robot that is judged by such poses is judged in the same postures.
     let mut by_readings = solution.series.clone();
     by_readings[0].postures.clear();

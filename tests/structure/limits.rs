@@ -61,8 +61,6 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/stops.rs JOINT_SIGMA", "noise of the ideal series"),
     ("assess/stops.rs POSE_SIGMA_M", "noise of the ideal series"),
     ("assess/stops.rs POSE_SIGMA_RAD", "noise of the ideal series"),
-    ("assess/stops.rs WIDEST_M", "range of the ideal series"),
-    ("assess/stops.rs WIDEST_RAD", "range of the ideal series"),
     ("assess/uncertainty.rs NORMAL_95", "quantile of the normal distribution"),
     ("diagnose/left_out/agreement.rs STEP", "step of a difference quotient"),
     ("diagnose/computed_postures.rs NAMED", "how many are named"),

@@ -251,7 +251,7 @@ pub(in crate::identify) fn told_by_seen<'a>(
         for &(s, row) in &stop.rows {
             let MeasuredSeries { stops, postures, .. } = &mut told[s];
             let before = stops[row].readings.replace(stop.candidates[c].readings.clone());
-            if let Some((other, before)) = postures[row].get_mut(c - 1).zip(before) {
+            if let Some((other, before)) = postures.get_mut(row).and_then(|own| own.get_mut(c - 1)).zip(before) {
                 *other = before;
             }
         }

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Vector3, Vector6};
 
 use super::bodies_record::first_instrument;
 use super::series_record::StopNoise;
-use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SolutionRecord};
+use super::solution_json::{CameraRecord, ImageRecord, PlateRecord, SeriesRecord, SolutionRecord};
 use crate::assess::{FlangeModel, Limits, Standing, usual_joint_sigma};
 use crate::error::{Code, Error, Result};
 use crate::frames::{KnownRobot, TouchedMarker};
@@ -109,6 +109,14 @@ fn stop(row: usize, image: &ImageRecord, series: &str, placements: &[String]) ->
     })
 }
 
+/// Other postures of every stop, where readings were computed.
+fn other_postures(series: &SeriesRecord, stops: &[MeasuredStop]) -> Vec<Vec<Vec<f64>>> {
+    if series.other_postures.is_empty() {
+        return Vec::new();
+    }
+    stops.iter().map(|stop| series.other_postures.get(&stop.image).cloned().unwrap_or_default()).collect()
+}
+
 /// Everything that was measured, ready to be solved again: what the solve had left out takes part again.
 ///
 /// # Errors
@@ -120,14 +128,13 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
         let (bodies, lengths) = (record.bodies.seen(&s.name), record.bodies.seen_lengths(&s.name));
         if !s.has_images {
             let own = MeasuredSeries::without_images(&s.name, s.order_known, record.bodies.stops_of(&s.name));
-            return Ok(MeasuredSeries { run: s.run.clone(), bodies, lengths, ..own });
+            let postures = other_postures(s, &own.stops);
+            return Ok(MeasuredSeries { run: s.run.clone(), bodies, lengths, postures, ..own });
         }
         let of_plate = || damaged(format!("series {} has no plate", s.name));
         let stops = record.images.iter().filter(|i| i.series == s.name).enumerate();
         let stops: Vec<MeasuredStop> =
             stops.map(|(row, i)| stop(row, i, &s.name, &placements)).collect::<Result<_>>()?;
-        let other_postures = |stop: &MeasuredStop| s.other_postures.get(&stop.image).cloned().unwrap_or_default();
-        let are_computed = !s.other_postures.is_empty();
         Ok(MeasuredSeries {
             name: s.name.clone(),
             run: s.run.clone(),
@@ -148,7 +155,7 @@ pub fn measured_series(record: &SolutionRecord) -> Result<Vec<MeasuredSeries>> {
             lengths,
             order_known: s.order_known,
             otherwise: Vec::new(),
-            postures: if are_computed { stops.iter().map(other_postures).collect() } else { Vec::new() },
+            postures: other_postures(s, &stops),
             stops,
         })
     });
