@@ -4,12 +4,14 @@ use std::path::{Path, PathBuf};
 
 use super::camera_section::CameraMount;
 use super::controller_file;
+use super::image_folder::image_files;
 use super::joints::{DEFAULT_PLACEMENT, SeriesStop, Stops};
+use super::light::Light;
 use super::manifest::Manifest;
 use super::measurement_series::{Series, Source, file_name};
 use super::observation_file;
 use super::plate_file::read_plate;
-use super::read::{folder_name, image_files, optional_images, plate_of, read};
+use super::read::{folder_name, plate_of, read};
 use super::recording::is_recording;
 use super::spatial::SpatialFiles;
 use crate::error::{Code, Error, Result};
@@ -51,7 +53,7 @@ pub fn read_without_robot(folder: &Path) -> Result<Series> {
             let remedy = "copy the images into it, or give them one by one with --plate";
             return Err(Error::new(Code::ImagesMissing, images.display(), "holds no image", remedy));
         }
-        let (dark, white) = optional_images(folder)?;
+        let Light { dark, white } = Light::of(&[&images, folder])?;
         (paths.into_iter().map(of_file).collect(), Source::Images { folder: images, dark, white })
     };
     let (folder, notices) = (folder.to_path_buf(), Vec::new());
@@ -66,11 +68,16 @@ pub fn read_without_robot(folder: &Path) -> Result<Series> {
 pub fn series_of_images(images: &[PathBuf], plate: &Path) -> Result<Series> {
     let mut inputs = Vec::new();
     let read = read_plate(plate, &mut inputs)?;
-    let earlier = |k: usize| images[..k].iter().find(|image| file_name(image) == file_name(&images[k]));
-    if let Some((k, first)) = (0..images.len()).find_map(|k| Some((k, earlier(k)?))) {
-        let what = format!("has the name of {} as well", first.display());
+    let twin_before = |(k, image): (usize, &PathBuf)| {
+        images[..k]
+            .iter()
+            .find(|earlier| file_name(earlier) == file_name(image))
+            .map(|earlier| (earlier, image.clone()))
+    };
+    if let Some((earlier, twin)) = images.iter().enumerate().find_map(twin_before) {
+        let what = format!("has the name of {} as well", earlier.display());
         let remedy = "images are told apart by their names: rename one";
-        return Err(Error::new(Code::ImageTwice, images[k].display(), what, remedy));
+        return Err(Error::new(Code::ImageTwice, twin.display(), what, remedy));
     }
     let folder = plate.parent().map_or_else(PathBuf::new, Path::to_path_buf);
     Ok(Series {
