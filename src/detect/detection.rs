@@ -2,7 +2,7 @@
 
 use super::circles::{self, Correlation, Drift, Ellipse, Found, InnerOuter, LOPSIDED_PX, Outcome};
 use crate::error::{Code, Error, Notice};
-use crate::series::Observation;
+use crate::series::{Observation, Plate};
 
 /// Identified observations of one image, and what was seen but not used.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,6 +21,8 @@ pub struct Detection {
     pub outline: Outline,
     /// Columns and rows of a chessboard or a grid of dots, in either order, where an outer line is missing and all ends are in view.
     pub size_seen: Option<[u32; 2]>,
+    /// Lines of a board of another size, in either order, where both of their ends are in view.
+    pub other_lines: [Option<u32>; 2],
     /// Why the image cannot be used, with no observations then; `None` where it can.
     pub failure: Option<Error>,
 }
@@ -29,6 +31,23 @@ impl Detection {
     /// A board that is not as large as the plate says, or whose markers stand in another layout.
     pub(super) fn other_size(error: Error) -> Self {
         Self { failure: Some(error), outline: Outline::OtherSize, ..Self::default() }
+    }
+
+    /// Whether what another image shows, of so many lines either way, may be a part of the board of another size in this one.
+    pub(super) fn may_hold(&self, part: [u32; 2]) -> bool {
+        let fits =
+            |part: [u32; 2]| part.iter().zip(self.other_lines).all(|(n, lines)| lines.is_none_or(|all| *n <= all));
+        fits(part) || fits([part[1], part[0]])
+    }
+
+    /// Columns and rows of the plate that the markers span which were found.
+    pub(super) fn span(&self, plate: &Plate) -> [u32; 2] {
+        let columns = plate.columns.max(1);
+        let range = |place: fn(u32, u32) -> u32| {
+            let all = self.observations.iter().map(|o| place(o.marker, columns));
+            all.clone().max().zip(all.min()).map_or(0, |(last, first)| last - first + 1)
+        };
+        [range(|id, columns| id % columns), range(|id, columns| id / columns)]
     }
 
     /// A board with a code that goes on where it should end.

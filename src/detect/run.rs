@@ -191,42 +191,57 @@ fn refuse_unproven_boards(images: &[PathBuf], plate: &Plate, found: &mut [Series
     let of = |outline: Outline| found.iter().find(|i| i.detection.outline == outline);
     let beyond = of(Outline::Beyond);
     if of(Outline::Whole).or_else(|| of(Outline::Beside)).is_some() && beyond.is_none() {
-        return refuse_parts_of_another(images, found);
+        return refuse_parts_of_another(images, plate, found);
     }
-    let other = beyond.or_else(|| of(Outline::OtherSize)).and_then(|i| i.detection.failure.clone());
+    let parts: Vec<[u32; 2]> =
+        found.iter().filter(|i| i.detection.failure.is_none()).map(|i| i.detection.span(plate)).collect();
+    // A board of which others show more is covered.
+    let holds_all = |i: &&SeriesImage| {
+        i.detection.outline == Outline::OtherSize && parts.iter().all(|part| i.detection.may_hold(*part))
+    };
+    let other = beyond.or_else(|| found.iter().find(holds_all));
+    let other = other.and_then(|i| i.detection.failure.as_ref()).map(named);
     let missing = || found.iter().filter(|i| i.detection.outline == Outline::LineMissing);
     let line = || {
         let told = missing().find(|i| i.detection.size_seen.is_some()).or_else(|| missing().next())?;
         Some(line_missing(plate, &told.detection))
     };
     let Some(error) = other.or_else(line) else { return };
-    // Too little of the outline is what such a board shows, too.
-    let in_doubt = |i: &SeriesImage| i.detection.failure.as_ref().is_none_or(|f| f.code == Code::PlateIncomplete);
-    for (path, image) in images.iter().zip(found).filter(|(_, image)| in_doubt(image)) {
+    for (path, image) in images.iter().zip(found).filter(|(_, image)| image.detection.failure.is_none()) {
         image.detection.observations.clear();
         image.detection.failure = Some(Error { place: path.display().to_string(), ..error.clone() });
     }
 }
 
-/// Where some images show the stated board whole, and one another board: what is seen in part may be of either.
-fn refuse_parts_of_another(images: &[PathBuf], found: &mut [SeriesImage]) {
+/// The reason of one image where it is said of others.
+fn named(failure: &Error) -> Error {
+    let name = Path::new(&failure.place).file_name().unwrap_or_default().to_string_lossy();
+    Error { what: format!("in {name} {}", failure.what), ..failure.clone() }
+}
+
+/// Where some images show the stated board whole, and one another board: what is seen in part may be of either, unless it is more than the
+/// other board has.
+fn refuse_parts_of_another(images: &[PathBuf], plate: &Plate, found: &mut [SeriesImage]) {
     let shows_another = |i: &SeriesImage| [Outline::Beside, Outline::OtherSize].contains(&i.detection.outline);
-    let Some(at) = found.iter().position(shows_another) else { return };
-    let what = format!("another board is in view of {}: this may be a part of it", images[at].display());
-    let remedy = "take the other board out of view, or take the image so that all of the stated one is in view";
     let is_part = |i: &SeriesImage| [Outline::Open, Outline::LineMissing].contains(&i.detection.outline);
-    for (path, image) in images.iter().zip(found) {
-        if is_part(image) && image.detection.failure.is_none() {
-            image.detection.observations.clear();
-            image.detection.failure = Some(Error::new(Code::PlateIncomplete, path.display(), &what, remedy));
-        }
+    let remedy = "take the other board out of view, or take the image so that all of the stated one is in view";
+    let refused = |path: &PathBuf, image: &SeriesImage| {
+        let span = Some(image).filter(|i| is_part(i) && i.detection.failure.is_none())?.detection.span(plate);
+        let at = found.iter().position(|other| shows_another(other) && other.detection.may_hold(span))?;
+        let what = format!("another board is in view of {}: this may be a part of it", images[at].display());
+        Some(Error::new(Code::PlateIncomplete, path.display(), what, remedy))
+    };
+    let refusals: Vec<Option<Error>> = images.iter().zip(&*found).map(|(path, image)| refused(path, image)).collect();
+    for (image, refusal) in found.iter_mut().zip(refusals).filter(|(_, refusal)| refusal.is_some()) {
+        image.detection.observations.clear();
+        image.detection.failure = refusal;
     }
 }
 
 /// A board without a code that no image shows from end to end has the size that the plate file says.
 fn note_board_nowhere_whole(plate: &Plate, found: &mut [SeriesImage]) {
-    let is_open = |i: &SeriesImage| i.detection.outline == Outline::Open;
-    if ![PlateKind::Chessboard, PlateKind::CircleGrid].contains(&plate.kind) || !found.iter().all(is_open) {
+    let is_whole = |i: &SeriesImage| [Outline::Whole, Outline::Beside].contains(&i.detection.outline);
+    if ![PlateKind::Chessboard, PlateKind::CircleGrid].contains(&plate.kind) || found.iter().any(is_whole) {
         return;
     }
     if let Some(image) = found.iter_mut().find(|i| i.detection.failure.is_none()) {

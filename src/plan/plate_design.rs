@@ -6,7 +6,7 @@
 
 use super::plate_code::{CodeDistance, PlateCode, WINDOW_LONG, WINDOW_SHORT};
 use crate::error::{Code, Error, Result};
-use crate::series::{Ink, Plate, PlateKind};
+use crate::series::{Ink, Plate, PlateKind, dictionary_named};
 
 /// Outer radius of a small marker as a share of the pitch.
 pub const SMALL_RADIUS: f64 = 0.20;
@@ -158,9 +158,27 @@ fn widest_radius(plate: &Plate) -> f64 {
     }
 }
 
+/// Light modules around a tag that stands alone.
+const TAG_MARGIN_MODULES: f64 = 2.0;
+/// Margin of a ChArUco board, whose markers are read within its squares, in squares.
+const CHARUCO_MARGIN: f64 = 0.5;
+
+/// Paper around what is printed, m: a pitch, by which the board ends in view, and less where codes tell that.
+pub fn margin_m(plate: &Plate) -> f64 {
+    let single = plate.tags.as_ref().filter(|_| plate.kind == PlateKind::Tag);
+    match single.map(|tags| (tags, dictionary_named(&tags.dictionary, "plate"))) {
+        Some((tags, Ok(dictionary))) => {
+            let modules = dictionary.marker_size() + 2 * tags.print.border();
+            TAG_MARGIN_MODULES * tags.side_m / modules as f64
+        }
+        _ if plate.kind == PlateKind::Charuco => CHARUCO_MARGIN * plate.pitch_m,
+        _ => plate.pitch_m,
+    }
+}
+
 /// Half width and half height of the field that must stay free of everything but markers, m.
 pub fn quiet_field_m(plate: &Plate) -> [f64; 2] {
-    let beyond = widest_radius(plate) + plate.pitch_m;
+    let beyond = widest_radius(plate) + margin_m(plate);
     let furthest = |axis: usize| plate.markers.iter().fold(0.0, |far: f64, m| far.max(m.position_m[axis].abs()));
     [furthest(0) + beyond, furthest(1) + beyond]
 }

@@ -6,7 +6,7 @@ use crate::boards_scene::{Print, Scene, View, errors, mirror, rms};
 use crate::said::assert_says;
 use calib_targets_aruco::Dictionary;
 use calib_targets_aruco::builtins::{
-    DICT_4X4_50, DICT_5X5_50, DICT_APRILTAG_16h5, DICT_APRILTAG_25h9, DICT_APRILTAG_36h10,
+    DICT_4X4_50, DICT_5X5_50, DICT_APRILTAG_16h5, DICT_APRILTAG_25h9, DICT_APRILTAG_36h10, DICT_ARUCO_MIP_36h12,
 };
 use nalgebra::Vector3;
 use robotcal::Code;
@@ -196,7 +196,7 @@ fn an_unstated_dictionary_is_found_and_a_wrong_one_or_a_mirror_refused() {
     let picture = charuco_scene(0.1).render(0);
     let detection = detect(&picture, &charuco_plate(None)).unwrap();
     assert_eq!(detection.observations.len(), 40);
-    assert_says(&detection.notices[0], Code::DictionaryGuessed, &["4X4", "0.7"]);
+    assert_says(&detection.notices[0], Code::DictionaryGuessed, &["4X4", "squares"]);
     let wrong = detect(&picture, &charuco_plate(Some(("DICT_6X6_250", 0.7)))).expect_err("another dictionary");
     assert_says(&wrong, Code::PlateNotFound, &["DICT_6X6_250", "DICT_4X4_1000"]);
     let unknown = detect(&picture, &charuco_plate(Some(("DICT_9X9", 0.7)))).expect_err("no such dictionary");
@@ -333,4 +333,30 @@ fn two_equal_boards_are_said() {
         assert!(!found.observations.is_empty());
         assert!(found.notices.iter().any(|n| n.code == Code::PlateTwice), "{:?}", found.notices);
     }
+}
+
+/// Dictionaries that are rarely printed are found, too, and the side is the one that is seen.
+#[test]
+fn every_dictionary_is_found_where_none_is_stated() {
+    let print = |dictionary| Print::Charuco { dictionary, ratio: 0.7, legacy: false };
+    for (dictionary, name) in [(DICT_APRILTAG_16h5, "16h5"), (DICT_ARUCO_MIP_36h12, "MIP_36h12"), (DICT_4X4_50, "4X4")]
+    {
+        let picture = Scene { print: print(dictionary), ..charuco_scene(0.1) }.render(0);
+        let found = detect(&picture, &charuco_plate(None)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(found.observations.len(), 40, "{name}");
+        let said = found.notices.iter().find(|n| n.code == Code::DictionaryGuessed).expect("said");
+        assert!(
+            said.what.contains(name) && (said.what.contains("0.70") || said.what.contains("0.69")),
+            "{}",
+            said.what
+        );
+    }
+}
+
+#[test]
+fn markers_that_begin_before_the_stated_first_are_named_by_their_numbers() {
+    let aruco = Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy: false, first_id: 10 };
+    let plate = Plate { aruco: Some(aruco), ..charuco_plate(None) };
+    let error = detect(&charuco_scene(0.1).render(0), &plate).expect_err("other numbers");
+    assert_says(&error, Code::PlateNotFound, &["0 to 26", "10 to 36", "first_id"]);
 }

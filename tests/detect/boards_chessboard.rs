@@ -342,3 +342,53 @@ fn few_images_are_looked_at_for_a_plate_of_another_kind() {
     let again = looked_at.into_inner() - paths.len();
     assert!((1..=10).contains(&again), "{again}");
 }
+
+/// All of the board and its left part on the border of the picture, of five columns or of three; in the last one a hand covers five columns up to a
+/// line of the board, so that it looks like a board of 4 x 6.
+fn partly_covered() -> Vec<(std::path::PathBuf, Picture)> {
+    let at = |centre: f64| Scene::new(9, 6, View::new(9, 6, [centre, 240.0], 33.0, 0.0, [0.0, 0.0]));
+    let views = [("whole.png", 321.0), ("wide.png", 60.0), ("narrow.png", -32.0)];
+    let mut all: Vec<_> = views.map(|(name, centre)| (name.into(), at(centre).render(0))).into();
+    let scene = at(321.0);
+    let mut picture = scene.render(0);
+    let edge = scene.corner(4)[0];
+    for (k, value) in picture.pixels.iter_mut().enumerate() {
+        if ((k % picture.width) as f64) < edge {
+            *value = 70.0;
+        }
+    }
+    all.push(("hand.png".into(), picture));
+    all
+}
+
+fn codes_of(images: &[(std::path::PathBuf, Picture)], chosen: &[usize]) -> Vec<(usize, Option<Code>)> {
+    let paths: Vec<_> = chosen.iter().map(|&k| images[k].0.clone()).collect();
+    let picture = |path: &std::path::Path| Ok(images.iter().find(|(p, _)| p == path).expect("one").1.clone());
+    let seen = detect_series(&paths, &plate(9, 6), picture, |_| {});
+    seen.iter().map(|i| (i.detection.observations.len(), i.detection.failure.as_ref().map(|f| f.code))).collect()
+}
+
+/// What a hand leaves looks like a smaller board: it is none of what another image shows more.
+#[test]
+fn a_hand_that_leaves_a_smaller_board_spares_images_that_show_more() {
+    let images = partly_covered();
+    let seen = codes_of(&images, &[0, 1, 2, 3]);
+    assert_eq!(seen[0], (54, None));
+    assert!(seen[1].0 >= 25 && seen[1].1.is_none(), "{seen:?}");
+    assert_eq!(seen[2..], [(0, Some(Code::PlateIncomplete)), (0, Some(Code::PlateContradicted))]);
+    let seen = codes_of(&images, &[1, 3]);
+    assert!(seen[0].0 >= 25 && seen[0].1.is_none(), "{seen:?}");
+    assert_eq!(seen[1], (0, Some(Code::PlateContradicted)));
+}
+
+/// What is seen in one image is said of others with its name.
+#[test]
+fn a_board_of_another_size_is_named_with_its_image_where_others_are_refused() {
+    let images = partly_covered();
+    let paths = [2, 3].map(|k: usize| images[k].0.clone());
+    let picture = |path: &std::path::Path| Ok(images.iter().find(|(p, _)| p == path).expect("one").1.clone());
+    let seen = detect_series(&paths, &plate(9, 6), picture, |_| {});
+    let [part, hand] = [0, 1].map(|k| seen[k].detection.failure.as_ref().expect("refused"));
+    assert_says(part, Code::PlateContradicted, &["hand.png", "4 x 6"]);
+    assert!(hand.what.contains("4 x 6") && !hand.what.contains("hand.png"), "{hand}");
+}

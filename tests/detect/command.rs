@@ -451,3 +451,33 @@ fn the_stated_chessboard_is_found_beside_a_larger_one() {
     }
     assert!(alone > 0);
 }
+
+/// There is no plate.toml as yet when a flag is wrong.
+#[test]
+fn an_unknown_family_or_dictionary_of_a_drawing_is_named_by_its_flag() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("plate");
+    for (flag, more) in [("--family", &["aprilgrid", "--shape", "6x5"][..]), ("--dictionary", &["tag"])] {
+        let output =
+            robotcal(&[&["plate", "--out", name(&out), "--tag-mm", "30", flag, "nonsense", "--kind"], more].concat());
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert_says(&text(&output), Code::DictionaryUnknown, &[flag, "nonsense"]);
+        assert!(!text(&output).contains("plate.toml:"), "{}", text(&output));
+    }
+}
+
+/// A tag of 120 mm, and a ChArUco board of 8 x 5 squares of 28 mm, on A4; what is said ends with a line end and says where to write what is measured.
+#[test]
+fn a_board_with_a_code_needs_a_narrow_margin() {
+    let folder = tempfile::tempdir().unwrap();
+    let tag = ["tag", "--tag-mm", "120", "--dictionary", "DICT_4X4_50"];
+    let charuco = ["charuco", "--shape", "8x5", "--pitch-mm", "28", "--tag-mm", "21", "--dictionary", "DICT_4X4_50"];
+    for args in [&tag[..], &charuco] {
+        let output = robotcal(
+            &[&["plate", "--out", name(&folder.path().join(args[0])), "--sheet", "A4", "--kind"], args].concat(),
+        );
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert!(said.ends_with('\n') && said.contains("[scale]"), "{said:?}");
+    }
+}

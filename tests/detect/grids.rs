@@ -440,3 +440,21 @@ fn a_grid_that_the_border_cuts_does_not_tell_its_size() {
         assert_eq!(error.code, Code::PlateIncomplete, "{error}");
     }
 }
+
+#[test]
+fn a_halo_of_strong_sharpening_loses_no_grid() {
+    let stated = grid("columns = 4\nrows = 11\nasymmetric = true");
+    for spoiling in [Spoiling::Sharpened(1.5, 1.5), Spoiling::Sharpened(1.0, 2.5)] {
+        let tally = run(&stated, &printed(&stated, &[], &[]), spoiling, views(), |id| 43 - id);
+        assert_eq!((tally.found, tally.wrong), (tally.dots, 0), "{spoiling:?}");
+    }
+}
+
+/// A larger dot at the wrong corner looks like a mirror: both are said.
+#[test]
+fn a_larger_dot_stated_at_the_wrong_corner_is_no_certain_mirror() {
+    let printed = printed(&grid("columns = 9\nrows = 7"), &[0], &[]);
+    let error =
+        detect(&shown(&printed, 1, 1.0), &grid("columns = 9\nrows = 7\nlarge = [[8, 0]]")).expect_err("elsewhere");
+    assert_says(&error, Code::PlateMirrored, &["large"]);
+}

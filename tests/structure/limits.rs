@@ -228,6 +228,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("output/camera_formats/distortion.rs ACROSS", "grid of a fit"),
     ("output/camera_formats/mod.rs SAME_PX", "rounding of a lens"),
     ("output/drawing/dot_font.rs ADVANCE", "size of a letter"),
+    ("output/drawing/plate_drawing.rs EDGE", "margin of printers"),
     ("output/robot/compensation.rs GRAVITY", "constant of nature"),
     ("output/robot/compensation_read.rs ROUNDED", "rounding of a file"),
     ("output/robot/controller_files.rs POSTURES", "samples of a check"),

@@ -10,7 +10,7 @@ use crate::cli::terminal::say::say;
 use crate::error::{Code, Error, Result};
 use crate::output::ResultFolder;
 use crate::output::plate_drawing::{Caption, pdf, png, svg};
-use crate::plan::plate_design::{Sheet, quiet_field_m};
+use crate::plan::plate_design::{Sheet, margin_m, quiet_field_m};
 use crate::series::{Plate, parse_plate, plate_csv, plate_toml, regions};
 
 /// Kinds of plates that are drawn.
@@ -97,7 +97,7 @@ pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &Bo
     let upright = sheet.paper.and_then(|name| Sheet::by_name(name, true));
     let sheet = upright.filter(|upright| !holds(&sheet) && holds(upright)).unwrap_or(sheet);
     if !holds(&sheet) {
-        let [width, height, margin] = [width, height, plate.pitch_m].map(|m| 1e3 * m);
+        let [width, height, margin] = [width, height, margin_m(&plate)].map(|m| 1e3 * m);
         let what =
             format!("the board needs {width:.0} x {height:.0} mm with a white margin of {margin:.0} mm all round");
         return Err(Error::new(Code::PlateImpossible, "--sheet", what, "take a larger sheet or a smaller board"));
@@ -119,7 +119,7 @@ pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &Bo
     let (width, height) = (sheet.width_m * 1e3, sheet.height_m * 1e3);
     say!(
         "plate     {name}: {} markers\npaper     {paper}{width:.0} x {height:.0} mm\nwritten   {}: {}\nnext      print \
-         plate.pdf at 100 %, glue it flat, and measure it",
+         plate.pdf at 100 %, glue it flat, measure between two of its markers and put that into [scale] of plate.toml\n",
         plate.markers.len(),
         out.display(),
         files.iter().map(|(file, _)| *file).collect::<Vec<_>>().join(", ")
@@ -135,13 +135,25 @@ fn plate(args: &BoardArgs, size: &BoardSize) -> Result<Plate> {
         let remedy = "leave it out; a charuco board, an aprilgrid, an aruco-grid and a tag have ids that may begin elsewhere than at 0";
         return Err(Error::new(Code::OptionConflict, "--id", what, remedy));
     }
-    let mut plate = parse_plate(Path::new("plate.toml"), &PlateText::of(args, size)?, "")?;
+    let mut plate = parse_plate(Path::new("plate.toml"), &PlateText::of(args, size)?, "")
+        .map_err(|error| named_by_flag(error, args))?;
     for id in std::mem::take(&mut plate.large) {
         if let Some(k) = plate.index_of(id) {
             plate.markers[k].outer_radius_m *= LARGER;
         }
     }
     Ok(plate)
+}
+
+/// An unknown dictionary comes from a flag: there is no plate.toml as yet.
+fn named_by_flag(error: Error, args: &BoardArgs) -> Error {
+    let given = [("--family", &args.family), ("--dictionary", &args.dictionary)];
+    match given.into_iter().find_map(|(flag, value)| Some((flag, value.as_ref()?))) {
+        Some((flag, value)) if error.code == Code::DictionaryUnknown => {
+            Error { place: format!("{flag} {value}"), ..error }
+        }
+        _ => error,
+    }
 }
 
 /// The text of a plate.toml as it is written from flags.

@@ -5,9 +5,9 @@
 
 use calib_targets_chessboard::ChessCorner;
 
-use super::charuco_markers::{Marker, Print, decode, prints};
+use super::charuco_markers::{Marker, Print, decode, prints, rare_prints};
 use super::charuco_numbers::{Contradiction, Counting, contradiction};
-use super::charuco_seen::{Seen, ids, instead};
+use super::charuco_seen::{Seen, elsewhere, ids, instead, side_seen};
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
 use super::sizes::{best_of_sizes, on_picture};
@@ -45,14 +45,21 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let mut bytes = Bytes::of(picture);
     let prints = prints(plate)?;
     let least = if plate.aruco.is_some() { 1 } else { LEAST_MARKERS };
-    let at_scale = |bytes: &Bytes, scale: f64| at_scale(bytes, scale, &prints, board, least);
-    let found = best_of_sizes(&bytes, board, |found: &Found| &found.lattice, |scale| at_scale(&bytes, scale))?;
+    let best = |prints: &[Print]| {
+        let at_scale = |scale: f64| at_scale(&bytes, scale, prints, board, least);
+        best_of_sizes(&bytes, board, |found: &Found| &found.lattice, at_scale)
+    };
+    let rare = rare_prints(plate);
+    let found = match best(&prints)? {
+        None if !rare.is_empty() => best(&rare)?,
+        found => found,
+    };
     let Some(found) = found else {
         bytes.mirror();
-        if at_scale(&bytes, 1.0)?.is_some() {
+        if at_scale(&bytes, 1.0, &prints, board, least)?.is_some() {
             return Err(mirrored_board());
         }
-        return Err(instead(picture, plate).map_or_else(|| no_board(plate), |seen| other_board(plate, &seen)));
+        return Err(elsewhere(picture, plate).map_or_else(|| no_board(plate), |seen| other_board(plate, &seen)));
     };
     if let Some(refusal) = numbers_contradict(picture, plate, board, &found) {
         return refusal;
@@ -80,7 +87,7 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
         return Err(other_board(plate, &seen));
     }
     if plate.aruco.is_none() {
-        detection.notices.push(found_print(&print));
+        detection.notices.push(found_print(&print, side_seen(picture, &print)));
     }
     detection.notices.extend(has_twin.then(twin));
     Ok(detection)
@@ -197,14 +204,13 @@ fn have_place(markers: &[Marker]) -> bool {
     rows.len() >= LEAST_MARKERS && rows.iter().any(|r| *r != rows[0])
 }
 
-fn found_print(print: &Print) -> Notice {
+fn found_print(print: &Print, side: f64) -> Notice {
     Notice::new(
         Code::DictionaryGuessed,
         "plate",
         format!(
-            "markers of {} with a side of about {} squares were found{}",
+            "markers of {} with a side of about {side:.2} squares were found{}",
             print.dictionary.name(),
-            print.ratio,
             if print.legacy { ", in OpenCV's layout before 4.6" } else { "" }
         ),
         match print.legacy {
@@ -249,6 +255,13 @@ fn other_board(plate: &Plate, seen: &Seen) -> Error {
         if let Some(side) = seen.side.filter(|_| seen.side_differs(plate)) {
             differs.push(format!("their side is {side:.2} squares"));
         }
+    }
+    if differs.is_empty() {
+        let [first, last] = seen.ids;
+        let stated = ids(plate);
+        let last_stated = stated.end.saturating_sub(1);
+        differs
+            .push(format!("markers {first} to {last} are read, and the board has {} to {last_stated}", stated.start));
     }
     let remedy = match seen.side_by_side {
         true => {

@@ -10,7 +10,7 @@ use calib_targets_core::{Coord, GrayImageView};
 
 use super::corner_finder::corner_config;
 use crate::detect::corners::lattice::BoardSize;
-use crate::detect::tags::scan::usual_dictionaries;
+use crate::detect::tags::scan::{other_dictionaries, usual_dictionaries};
 use crate::error::{Code, Error, Result};
 use crate::series::{Plate, dictionary_named};
 
@@ -129,7 +129,7 @@ fn layouts(plate: &Plate, legacy: bool) -> impl Iterator<Item = bool> + Clone + 
 
 /// What is printed according to the plate and in the other layout, or all that OpenCV prints.
 pub(super) fn prints(plate: &Plate) -> Result<Vec<Print>> {
-    let Some(aruco) = &plate.aruco else { return Ok(usual_prints(plate)) };
+    let Some(aruco) = &plate.aruco else { return Ok(usual_prints(plate, usual_dictionaries())) };
     let dictionary = dictionary_named(&aruco.dictionary, "plate")?;
     let needed = u64::from(aruco.first_id) + u64::from(needed(plate));
     if needed > dictionary.codes().len() as u64 {
@@ -141,9 +141,14 @@ pub(super) fn prints(plate: &Plate) -> Result<Vec<Print>> {
     Ok(layouts(plate, aruco.legacy).map(|legacy| Print { dictionary, ratio, legacy, first_id }).collect())
 }
 
+/// Prints of the dictionaries that are rarely used, where the plate does not state one.
+pub(super) fn rare_prints(plate: &Plate) -> Vec<Print> {
+    if plate.aruco.is_none() { usual_prints(plate, other_dictionaries()) } else { Vec::new() }
+}
+
 /// All that OpenCV prints with enough markers for the plate, in the usual sizes.
-fn usual_prints(plate: &Plate) -> Vec<Print> {
-    let able = usual_dictionaries().filter(|d| d.codes().len() >= needed(plate) as usize);
+fn usual_prints(plate: &Plate, dictionaries: impl Iterator<Item = Dictionary>) -> Vec<Print> {
+    let able = dictionaries.filter(|d| d.codes().len() >= needed(plate) as usize);
     let sizes = able.flat_map(|dictionary| USUAL_RATIOS.map(|ratio| (dictionary, ratio)));
     let print = |dictionary, ratio, legacy| Print { dictionary, ratio, legacy, first_id: 0 };
     sizes

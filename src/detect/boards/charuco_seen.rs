@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use calib_targets_aruco::Dictionary;
 
-use super::charuco_markers::needed;
+use super::charuco_markers::{Print, needed};
 use crate::detect::Picture;
 use crate::detect::tags::code::Reader;
 use crate::detect::tags::layout::Layout;
@@ -29,6 +29,8 @@ pub struct Seen {
     pub side_by_side: bool,
     /// The number in the middle of those of the markers.
     pub middle_id: Option<u32>,
+    /// The least and the greatest number of those that stand in a common layout.
+    pub ids: [u32; 2],
     pairs: usize,
 }
 
@@ -47,6 +49,7 @@ impl Seen {
             side: layout.length(2).map(|two| 2.0 / two),
             side_by_side,
             middle_id: layout.middle_id(),
+            ids: layout.first_and_last_id(),
             pairs,
         }
     }
@@ -88,8 +91,24 @@ fn stated(plate: &Plate) -> Option<Dictionary> {
 
 /// The board that most markers agree with, where it is another one.
 pub fn instead(picture: &Picture, plate: &Plate) -> Option<Seen> {
+    seen(picture, plate).filter(|best| !best.is(plate))
+}
+
+/// The same, or the stated board with some numbers that it has not.
+pub fn elsewhere(picture: &Picture, plate: &Plate) -> Option<Seen> {
+    let has_others = |seen: &Seen| seen.ids.iter().any(|id| !ids(plate).contains(id));
+    seen(picture, plate).filter(|best| !best.is(plate) || has_others(best))
+}
+
+fn seen(picture: &Picture, plate: &Plate) -> Option<Seen> {
     let passes: Vec<Vec<Quad>> = passes(picture).collect();
-    agreed(picture, &passes, stated(plate).into_iter().chain(usual_dictionaries())).filter(|best| !best.is(plate))
+    agreed(picture, &passes, stated(plate).into_iter().chain(usual_dictionaries()))
+}
+
+/// Side of the markers over that of a square, as their contours tell it, or else as they are read.
+pub fn side_seen(picture: &Picture, print: &Print) -> f64 {
+    let passes: Vec<Vec<Quad>> = passes(picture).collect();
+    Seen::of(picture, &passes, print.dictionary).side.unwrap_or(print.ratio)
 }
 
 /// The board that most markers agree with, of these dictionaries.

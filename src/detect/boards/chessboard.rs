@@ -86,8 +86,9 @@ fn on_lattice(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Result<
 
 /// A board of another size is named as that, whatever else there is to say.
 fn refusal(picture: &Picture, lattice: &Lattice, board: BoardSize, otherwise: Error) -> Result<Detection> {
-    match BoardSeen::of(picture, lattice).and_then(|seen| seen.contradiction(board)) {
-        Some(error) => Ok(Detection::other_size(error)),
+    let seen = BoardSeen::of(picture, lattice);
+    match seen.and_then(|seen| Some((seen.lines(), seen.contradiction(board)?))) {
+        Some((other_lines, error)) => Ok(Detection { other_lines, ..Detection::other_size(error) }),
         None => Err(otherwise),
     }
 }

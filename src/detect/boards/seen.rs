@@ -51,6 +51,11 @@ impl BoardSeen {
         Some([self.along(0)?, self.along(1)?])
     }
 
+    /// Inner corners along u and v, each where both ends are in view.
+    pub fn lines(&self) -> [Option<u32>; 2] {
+        [self.along(0), self.along(1)]
+    }
+
     /// Whether it has the size of a board, with all ends in view.
     pub fn is(&self, board: BoardSize) -> bool {
         let [columns, rows] = [board.columns, board.rows].map(i32::unsigned_abs);

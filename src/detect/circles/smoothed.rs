@@ -21,6 +21,8 @@ use crate::detect::Picture;
 const SYSTEMATIC_PX: f64 = 0.004;
 /// Smoothings that are tried where edges are not blurred steps, px.
 pub(super) const SMOOTHINGS_PX: [f64; 2] = [0.7, 1.0];
+/// And the last one, for halos of strong sharpening, where no lattice of dots is found otherwise.
+pub(super) const LAST_SMOOTHING_PX: f64 = 1.6;
 /// Of the kernel, in sigmas.
 const REACH: f64 = 4.0;
 

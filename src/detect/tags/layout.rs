@@ -57,6 +57,11 @@ impl Layout {
         self.places.keys().nth(self.places.len() / 2).copied()
     }
 
+    /// The least and the greatest number; 0 where there is no tag.
+    pub fn first_and_last_id(&self) -> [u32; 2] {
+        [self.places.keys().next(), self.places.keys().next_back()].map(|id| id.copied().unwrap_or(0))
+    }
+
     /// By how much the number of a tag changes with so many steps, as most pairs say.
     pub fn change(&self, steps: Steps) -> Option<i64> {
         self.agreed(steps).map(|(change, _)| change)

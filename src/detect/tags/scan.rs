@@ -24,10 +24,15 @@ pub fn usual_dictionaries() -> impl Iterator<Item = Dictionary> {
     longest.into_iter().chain([builtins::DICT_ARUCO_ORIGINAL, builtins::DICT_APRILTAG_36h11])
 }
 
+/// Those that OpenCV has besides.
+pub fn other_dictionaries() -> impl Iterator<Item = Dictionary> {
+    let tags = [builtins::DICT_APRILTAG_16h5, builtins::DICT_APRILTAG_25h9, builtins::DICT_APRILTAG_36h10];
+    tags.into_iter().chain([builtins::DICT_ARUCO_MIP_36h12])
+}
+
 /// All that OpenCV has.
 pub fn all_dictionaries() -> impl Iterator<Item = Dictionary> {
-    let others = [builtins::DICT_APRILTAG_16h5, builtins::DICT_APRILTAG_25h9, builtins::DICT_APRILTAG_36h10];
-    usual_dictionaries().chain(others).chain([builtins::DICT_ARUCO_MIP_36h12])
+    usual_dictionaries().chain(other_dictionaries())
 }
 
 /// Dark quadrilaterals, pass by pass.

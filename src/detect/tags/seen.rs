@@ -92,7 +92,8 @@ pub(super) fn instead(picture: &Picture, plate: &Plate, tags: &Tags, passes: &[V
     };
     let what = format!("{wanted} of {} not found, but {there} of {dictionary}", tags.dictionary);
     let (what, remedy) = if print.border() != tags.print.border() {
-        let what = format!("{what} with a border of {} modules", print.border());
+        let border = print.border();
+        let what = format!("{what} with a border of {border} {}", if border == 1 { "module" } else { "modules" });
         (
             what,
             "correct kind in the plate file: an aprilgrid has tags with a border of 2 modules, an aruco-grid and a tag of 1",

@@ -44,19 +44,43 @@ const RULE: f64 = 0.0006;
 /// Half of the advance of a letter in the widest font, a dot font of 7 rows.
 const HALF_LETTER: f64 = 3.0 / 7.0 * TEXT;
 /// Of the bar below the quiet field, and of the lines of text.
-const BAR_BELOW: f64 = 0.0045;
-const TEXT_BELOW: f64 = 0.0105;
+const ROOMY: Below = Below { bar: 0.0045, text: 0.0105, step: 1.5 * TEXT };
+/// The same where the sheet leaves little room: the text just clears the ticks of the bar.
+const TIGHT: Below = Below { bar: 0.0032, text: 0.0088, step: 1.15 * TEXT };
+/// Printers leave out what is nearer to the edge of the sheet.
+const EDGE: f64 = 0.005;
+
+/// How far what is said lies below the quiet field, m.
+#[derive(Debug, Clone, Copy)]
+struct Below {
+    bar: f64,
+    /// The first line.
+    text: f64,
+    /// From line to line.
+    step: f64,
+}
+
+impl Below {
+    /// As roomy as the strip below the field allows.
+    fn of(room: f64) -> Self {
+        let [roomy, tight] = [ROOMY, TIGHT].map(|below| below.text + below.step + EDGE);
+        let share = ((room - tight) / (roomy - tight)).clamp(0.0, 1.0);
+        let between = |pick: fn(&Self) -> f64| pick(&TIGHT) + share * (pick(&ROOMY) - pick(&TIGHT));
+        Self { bar: between(|b| b.bar), text: between(|b| b.text), step: between(|b| b.step) }
+    }
+}
 
 /// All figures of a plate on its sheet.
 pub(super) fn figures(plate: &Plate, caption: &Caption) -> Vec<Figure> {
     let mut all = marks(plate);
     let quiet = quiet_field_m(plate);
     let half = [caption.sheet.width_m / 2.0, caption.sheet.height_m / 2.0];
-    axes(quiet, half, &mut all);
+    let below = Below::of(half[1] - quiet[1]);
+    axes(quiet, half, below.bar, &mut all);
     let bottom = -quiet[1];
-    let line = |k: f64| [0.0, bottom - TEXT_BELOW - k * 1.5 * TEXT];
+    let line = |k: f64| [0.0, bottom - below.text - k * below.step];
     let tens = bar_tens(half[0]);
-    scale_bar(bottom - BAR_BELOW, tens, &mut all);
+    scale_bar(bottom - below.bar, tens, &mut all);
     ruled_text(line(0.0), half[0], &format!("{}.", caption.name), &mut all);
     ruled_text(line(1.0), half[0], &advice(&caption.sheet, tens), &mut all);
     all
@@ -101,14 +125,14 @@ fn squares(plate: &Plate) -> Vec<Figure> {
 }
 
 /// Marks on all four sides that point at the origin, arrows where the axes leave the field.
-fn axes(quiet: [f64; 2], half: [f64; 2], all: &mut Vec<Figure>) {
-    let along = (half[0] - quiet[0] - 0.006).clamp(0.004, 0.008);
-    let up = 0.010;
+fn axes(quiet: [f64; 2], half: [f64; 2], bar_below: f64, all: &mut Vec<Figure>) {
+    let along = (half[0] - quiet[0] - EDGE - 0.003).clamp(0.004, 0.008);
+    let up = (half[1] - quiet[1] - EDGE - 0.0005 - TEXT).clamp(0.004, 0.010);
     let (x, y) = (quiet[0] + along, quiet[1] + up);
     let mut line = |from, to| all.push(Figure::Line { from, to, width: LINE });
     line([-x, 0.0], [-quiet[0], 0.0]);
     line([quiet[0], 0.0], [x, 0.0]);
-    line([0.0, -quiet[1] - BAR_BELOW], [0.0, -quiet[1]]);
+    line([0.0, -quiet[1] - bar_below], [0.0, -quiet[1]]);
     line([0.0, quiet[1]], [0.0, y]);
     for side in [-0.001, 0.001] {
         line([x - 0.003, side], [x, 0.0]);
@@ -136,7 +160,7 @@ fn scale_bar(y: f64, tens: u32, all: &mut Vec<Figure>) {
 
 /// A line of text on a line that joins its letters, as far as the sheet reaches: a dash, which does not reach down to it, is left out.
 fn ruled_text(at: [f64; 2], half_width: f64, line: &str, all: &mut Vec<Figure>) {
-    let half = (HALF_LETTER * line.len() as f64).min(half_width - 0.004);
+    let half = (HALF_LETTER * line.len() as f64).min(half_width - EDGE);
     all.push(Figure::Line { from: [at[0] - half, at[1]], to: [at[0] + half, at[1]], width: RULE });
     text(at, &line.replace('-', " "), all);
 }
@@ -180,6 +204,26 @@ mod tests {
                 };
                 assert!(corners.iter().all(|p| !in_field(p)), "{shape:?} {corners:?}");
                 assert!(corners.iter().all(on_sheet), "{shape:?} {corners:?} {:?}", made.sheet);
+            }
+        }
+    }
+
+    /// Printers leave out some millimetres at the edge: 17 mm below the field are enough for the lines of text.
+    #[test]
+    fn text_keeps_five_millimetres_from_the_edge() {
+        let plate = Plate::lattice(crate::series::PlateKind::Chessboard, 9, 6, 0.02, 1e-4);
+        let quiet = quiet_field_m(&plate);
+        for room in [0.0171, 0.0175, 0.019, 0.025] {
+            let sheet = Sheet::of_size([2.0 * (quiet[0] + 0.013), 2.0 * (quiet[1] + room)]);
+            let half = [sheet.width_m / 2.0, sheet.height_m / 2.0];
+            let all = figures(&plate, &Caption { name: "a name".to_owned(), sheet });
+            let lines = all.iter().filter_map(|figure| match figure {
+                Figure::Text { at, height, .. } => Some((*at, *height)),
+                _ => None,
+            });
+            for ([x, y], height) in lines {
+                let free = [half[0] - x.abs() - HALF_LETTER, half[1] + y, half[1] - y - height];
+                assert!(free.iter().all(|room| *room > EDGE - 1e-9), "{room}: {x} {y} {free:?}");
             }
         }
     }

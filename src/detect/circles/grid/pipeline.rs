@@ -21,7 +21,7 @@ use crate::detect::circles::identity::lattice::{Apart, Cell, Lattice, Site};
 use crate::detect::circles::identity::neighbour_check::{Board, Placed};
 use crate::detect::circles::measuring::glare::allow_for_glare;
 use crate::detect::circles::pipeline::{Cut, Identified, detect_coded};
-use crate::detect::circles::smoothed::{SMOOTHINGS_PX, as_before, smoothed};
+use crate::detect::circles::smoothed::{LAST_SMOOTHING_PX, SMOOTHINGS_PX, as_before, smoothed};
 use crate::detect::circles::types::{CircleDetection, Options, Outcome, Reason};
 use crate::detect::size_seen::{Counted, beyond, other_rows, other_size, twin};
 use crate::detect::{Detection, Outline, Picture, Sizes};
@@ -50,8 +50,9 @@ pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Resul
     let grid = Grid::of(plate)?;
     let options = &Options { smallest_semi_axis_px: options.smallest_semi_axis_px.min(SMALLEST_PX), ..*options };
     let (mut best, mut facts) = grid.look(picture, options, 0.0)?;
-    for sigma_px in SMOOTHINGS_PX {
-        if !spoilt(&best) {
+    for sigma_px in SMOOTHINGS_PX.into_iter().chain([LAST_SMOOTHING_PX]) {
+        let is_last = sigma_px == LAST_SMOOTHING_PX;
+        if !spoilt(&best) || is_last && !best.found.is_empty() {
             break;
         }
         let (found, other) = grid.look(&smoothed(picture, sigma_px), options, sigma_px)?;
@@ -67,6 +68,9 @@ pub fn detect_grid(picture: &Picture, plate: &Plate, options: &Options) -> Resul
     if let Some(circles) = &mut detection.circles {
         circles.sizes = facts.sizes;
     }
+    if facts.is_mirror_of_large && detection.failure.as_ref().is_some_and(|f| f.code == Code::PlateMirrored) {
+        detection.failure = Some(mirrored_or_large());
+    }
     if facts.symmetric {
         detection.notices.push(symmetric_notice());
         detection.notices.extend((!facts.unstated.is_empty()).then(|| unstated_notice(&facts.unstated)));
@@ -80,7 +84,10 @@ impl Detection {
         let is_found = |id: u32| self.observations.iter().any(|o| o.marker == id);
         let ambiguous = self.failure.as_ref().is_some_and(|f| f.code == Code::PlateIncomplete);
         match &facts.other_size {
-            Some(error) if ambiguous => (self.outline, self.failure) = (Outline::OtherSize, Some(error.clone())),
+            Some(error) if ambiguous => {
+                (self.outline, self.failure) = (Outline::OtherSize, Some(error.clone()));
+                self.other_lines = facts.other_lines;
+            }
             None if ambiguous && facts.cut => self.failure = Some(cut_grid()),
             _ => {
                 self.outline = outline(&facts.outer, is_found);
@@ -108,6 +115,10 @@ struct Facts {
     size: Option<[u32; 2]>,
     /// Why it is not the grid of the plate.
     other_size: Option<Error>,
+    /// Its columns and rows, where its rows are as those of the plate and all ends are in view.
+    other_lines: [Option<u32>; 2],
+    /// Only its dots of another size say that it is mirrored.
+    is_mirror_of_large: bool,
     /// Not all of them end in view.
     cut: bool,
     /// The outer lines of the plate.
@@ -193,6 +204,7 @@ impl<'a> Grid<'a> {
         };
         let (mut laid, outcome) = place(&code, &self.cells, &classes);
         let mut facts = self.outlined(&view, laid.first(), outcome);
+        facts.is_mirror_of_large = outcome == Outcome::Mirrored && self.fits_without_sizes(&dots, lattice)?;
         if facts.other_size.is_some() {
             return nothing(Outcome::Ambiguous, facts);
         }
@@ -229,6 +241,12 @@ impl<'a> Grid<'a> {
         Ok((self.identified(plate, board(chosen, lattice, &classes), outcome)?, facts))
     }
 
+    /// Whether the lattice lies on the plate unmirrored, its dots taken as alike.
+    fn fits_without_sizes(&self, dots: &Dots, lattice: &Lattice) -> Result<bool> {
+        let code = self.code(&self.with_large(dots, |_| false))?;
+        Ok(matches!(place(&code, &self.cells, &all_alike(lattice)).1, Outcome::Identified { .. }))
+    }
+
     /// The dots of a lattice; `None` where they are not of the sizes that the plate tells.
     fn dots(&self, told: Told, view: &View) -> Option<Dots> {
         let of = if told == Told::Equal { Dots::alike } else { Dots::of };
@@ -255,7 +273,9 @@ impl<'a> Grid<'a> {
         let cut = shape.is_some_and(|(_, in_view)| !in_view);
         let shape = shape.filter(|(_, in_view)| *in_view).map(|(shape, _)| shape);
         let other_size = self.other_size(shape, view.lattice, laid, outcome);
-        Facts { cut, size: shape.and_then(Shape::columns_and_rows), other_size, ..Facts::default() }
+        let is_alike = |seen: &Shape| self.extent().is_some_and(|stated| stated.shape.asymmetric == seen.asymmetric);
+        let other_lines = shape.filter(is_alike).and_then(Shape::columns_and_rows).map_or([None; 2], |s| s.map(Some));
+        Facts { cut, size: shape.and_then(Shape::columns_and_rows), other_size, other_lines, ..Facts::default() }
     }
 
     /// Keeps the turns in which the dots that are not as most are, those that are missing among them, have the least places.
@@ -276,7 +296,7 @@ impl<'a> Grid<'a> {
         laid: Option<&Laid>,
         outcome: Outcome,
     ) -> Option<Error> {
-        let stated = Extent::of(self.cells.iter().copied())?;
+        let stated = self.extent()?;
         let goes_on = |laid: &Laid| {
             let on_plate: BTreeSet<Cell> = lattice.cells.keys().map(|cell| laid.apply(*cell)).collect();
             let there = |line: &Vec<Cell>| line.iter().filter(|cell| on_plate.contains(cell)).count();
@@ -298,7 +318,7 @@ impl<'a> Grid<'a> {
 
     /// The outer lines of the plate, and of which of their dots there is only paper.
     fn outer(&self, view: &View, laid: &Laid) -> Vec<Vec<Outer>> {
-        let Some(stated) = Extent::of(self.cells.iter().copied()) else { return Vec::new() };
+        let Some(stated) = self.extent() else { return Vec::new() };
         let range = |pick: fn(&Cell) -> i32| {
             let all = view.lattice.cells.keys().map(pick);
             all.clone().min().unwrap_or(0) - FURTHER..=all.max().unwrap_or(0) + FURTHER
@@ -310,6 +330,10 @@ impl<'a> Grid<'a> {
             Some((self.plate.markers[marker].id, on_lattice.get(cell).is_some_and(|at| view.is_blank(*at))))
         };
         stated.sides(false).iter().map(|line| line.iter().filter_map(outer).collect()).collect()
+    }
+
+    fn extent(&self) -> Option<Extent> {
+        Extent::of(self.cells.iter().copied())
     }
 
     fn code(&self, plate: &Plate) -> Result<MarkerCode> {
@@ -462,6 +486,15 @@ fn cut_grid() -> Error {
         "image",
         "the dots reach the border of the image, or what covers them: neither their number nor their place on the plate can be told",
         "take the image so that all dots are in view with paper around them, and check columns and rows of the plate file",
+    )
+}
+
+fn mirrored_or_large() -> Error {
+    Error::new(
+        Code::PlateMirrored,
+        "image",
+        "the dots of another size stand where the mirror image of the plate has them",
+        "switch off the mirroring in the camera driver; if nothing is mirrored, correct large (or plate.csv) of the plate file: column and row count from 0 at the top-left dot",
     )
 }
 
