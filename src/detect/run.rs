@@ -108,7 +108,7 @@ pub fn detect_series<P: Into<Loaded>>(
     note_board_nowhere_whole(plate, &mut found);
     note_unseen_tags(images, plate, &mut found);
     refuse_odd_sizes(images, &mut found);
-    refuse_odd_dots(images, &mut found);
+    refuse_odd_dots(images, plate, &mut found);
     note_turned(images, &mut found);
     if !found.iter().any(shows) {
         name_other_kind(images, plate, picture, &mut found);
@@ -161,27 +161,32 @@ fn bytes_of(path: &Path) -> u64 {
     picture_size(path).map_or(0, |(w, h)| BYTES_PER_PX * u64::from(w) * u64::from(h))
 }
 
-/// The dots that are larger tell how a grid is turned: images that show others than most have ids that nobody can trust.
-fn refuse_odd_dots(images: &[PathBuf], found: &mut [SeriesImage]) {
+/// The dots that are larger tell how a grid is turned: images that show others than most, or none of them, have ids that nobody can trust. That there
+/// are none, an image says which shows all dots; others may not show the larger ones.
+fn refuse_odd_dots(images: &[PathBuf], plate: &Plate, found: &mut [SeriesImage]) {
     let large = |i: &SeriesImage| {
         let sizes = i.detection.circles.as_ref().filter(|_| i.detection.failure.is_none()).map(|c| &c.sizes);
         sizes.filter(|s| !s.radii_m.is_empty()).map(|s| s.large.clone())
     };
+    let says = |i: &SeriesImage| {
+        large(i).filter(|seen| !seen.is_empty() || i.detection.observations.len() == plate.markers.len())
+    };
     let mut counts: BTreeMap<Vec<u32>, usize> = BTreeMap::new();
-    for seen in found.iter().filter_map(large) {
+    for seen in found.iter().filter_map(says) {
         *counts.entry(seen).or_default() += 1;
     }
     let Some((usual, count)) = counts.into_iter().max_by_key(|(_, count)| *count) else { return };
     for (path, image) in images.iter().zip(found) {
-        if large(image).is_some_and(|seen| seen != usual) {
-            image.detection.observations.clear();
-            image.detection.failure = Some(Error::new(
-                Code::PlateIncomplete,
-                path.display(),
-                format!("the larger dots are not those that {count} images show: its ids cannot be told"),
-                "take the image so that all larger dots are seen, or state them in plate.toml: large = [[column, row], ..]",
-            ));
-        }
+        let Some(seen) = large(image).filter(|seen| *seen != usual) else { continue };
+        let what = match seen.is_empty() {
+            true => format!("shows none of the larger dots that {count} images show: its ids cannot be told"),
+            false => format!("the larger dots are not those that {count} images show: its ids cannot be told"),
+        };
+        let remedy =
+            "take the image so that all larger dots are seen, or state them in plate.toml: large = [[column, row], ..]";
+        image.detection.observations.clear();
+        image.detection.notices.retain(|notice| notice.code != Code::PlateSymmetric);
+        image.detection.failure = Some(Error::new(Code::PlateIncomplete, path.display(), what, remedy));
     }
 }
 

@@ -346,6 +346,24 @@ fn an_image_without_the_larger_dot_that_the_others_show_is_refused() {
     }
 }
 
+/// Most images do not show the corner with the larger dot: they say nothing against those that do.
+#[test]
+fn images_that_cannot_show_the_larger_dot_do_not_outvote_those_that_do() {
+    let stated = grid("columns = 8\nrows = 6");
+    let paths: Vec<_> = (0..5).map(|seed| Path::new(&format!("{seed}.png")).to_path_buf()).collect();
+    let picture = |seed: u64| {
+        let mut plate = printed(&stated, &[0], &[]);
+        plate.markers[0].outer_radius_m *= if seed < 2 { 1.0 } else { 0.0 };
+        let view = view(&mut ChaCha8Rng::seed_from_u64(seed), Spoiling::None);
+        Scene { plate, camera_from_plate: pose(&view), ..scene(&view) }.render(seed)
+    };
+    let number = |path: &Path| path.file_stem().unwrap().to_str().unwrap().parse().unwrap();
+    let seen = detect_series(&paths, &stated, |path| Ok(picture(number(path))), |_| {});
+    let counts: Vec<usize> = seen.iter().map(|i| i.detection.observations.len()).collect();
+    assert_eq!(counts, [48, 48, 0, 0, 0]);
+    assert!(seen[2..].iter().all(|i| i.detection.failure.as_ref().is_some_and(|f| f.code == Code::PlateIncomplete)));
+}
+
 /// The larger dot is not where plate.toml says: the outline leaves the turn open, and nothing settles it.
 #[test]
 fn a_larger_dot_in_another_place_than_stated_is_named() {

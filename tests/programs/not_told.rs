@@ -49,7 +49,7 @@ fn a_tool_that_is_stated_is_on_the_flange_where_the_text_does_not_tell() {
             .try_into()
             .unwrap();
     let (readings, tool) = (cell.readings(), "--tool=0,0,100,0,0,0");
-    let files = [(name, text.replace("XP1", &krl(&mut cell, &readings)))];
+    let files = [(name, text.replace("XP1", &krl(&cell, &readings)))];
     assert_eq!(told(&cell, &files, &[tool]), (1, vec![]));
     assert_eq!(told(&cell, &files, &[]), (0, vec![LeftReason::ToolUnknown.name().to_owned()]));
 }
