@@ -84,7 +84,7 @@ fn held_by(share: f64, mut normal: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Residuals of points beyond the unknowns of frame and reflector.
-pub(super) fn freedom(points: usize) -> f64 {
+pub fn freedom(points: usize) -> f64 {
     (3 * points).saturating_sub(FITTED) as f64
 }
 

@@ -196,7 +196,6 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("cli/series/plan_touches.rs TRIES", "samples of a search"),
     ("cli/images/plate_board.rs LARGER", "what is drawn"),
     ("cli/flags/recording.rs LONGEST_DELAY_S", "range of an option"),
-    ("cli/corrected_robot/verify_stated.rs FITTED", "unknowns of frame and reflector"),
     ("cli/corrected_robot/verify_verdict.rs FITTED", "unknowns of frame and reflector, three a point"),
     ("init/between.rs HELD", "rounding"),
     ("init/between.rs REFINED", "starts of a search"),

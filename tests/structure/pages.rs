@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use robotcal::assess::Limits;
+
 use crate::architecture::LEVELS;
 
 fn src() -> PathBuf {
@@ -88,6 +90,17 @@ fn every_key_of_a_solution_stands_in_the_manual() {
     }
     let missing: Vec<&String> = there.iter().filter(|key| !words.contains(key.as_str())).collect();
     assert!(missing.is_empty(), "not in guide/solution_file.md: {missing:?}");
+}
+
+/// Command of the README that makes the shipped result, and the limits that are stated in it.
+#[test]
+fn the_shipped_result_is_made_by_the_command_of_the_readme() {
+    let [readme, shipped] = ["../README.md", "../reports/kr6_small/solution.json"]
+        .map(|path| fs::read_to_string(src().join(path)).unwrap());
+    let command = readme.lines().find_map(|l| l.trim().strip_prefix("cargo run --release -- identify")).unwrap();
+    let shipped: serde_json::Value = serde_json::from_str(&shipped).unwrap();
+    assert_eq!(shipped["program"]["command"], format!("target/release/robotcal identify{command}"));
+    assert_eq!(shipped["options"]["limits"], serde_json::to_value(Limits::default()).unwrap());
 }
 
 /// Share, ends of its interval and letter of a two-stage fit, of a row of the table of decision 7.

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Vector3, Vector6};
 
 use super::compensate_frames::{NoSolution, Side, part, solution};
 use crate::assess::{
-    Limits, MeasuredPoint, NORMAL_95, PredictedFlange, by_readings, fit_points, most_of_sum, root_mean_square,
+    Limits, MeasuredPoint, NORMAL_95, PredictedFlange, by_readings, fit_points, freedom, most_of_sum, root_mean_square,
 };
 use crate::diagnose::Weight;
 use crate::error::{Error, Result};
@@ -47,8 +47,6 @@ pub(super) struct ExpectedAtPoints {
 const OBSERVATIONS: &str = "observations.csv";
 /// Ends of the names of images and recordings.
 const RECORDED: [&str; 8] = ["png", "tif", "tiff", "pgm", "jpg", "jpeg", "bmp", "mcap"];
-/// Parameters of frame and reflector, which every fit of points takes up.
-const FITTED: f64 = 9.0;
 /// Folders of images that several series may have in common.
 const FLAT_FIELD: [&str; 2] = ["dark", "white"];
 
@@ -127,9 +125,8 @@ impl Stated {
         });
         let each_m = each.collect();
         // Of so many coordinates, less what frame and reflector take up.
-        let count = points.len() as f64;
-        let freedom = (3.0 * count - FITTED).max(1.0);
-        let device_m = device_m * (freedom / count).sqrt();
+        let freedom = freedom(points.len()).max(1.0);
+        let device_m = device_m * (freedom / points.len() as f64).sqrt();
         let most_m = device_m * (1.0 + NORMAL_95 / (2.0 * freedom).sqrt());
         let all = Expectation { rms_m: expected.rms_m.hypot(device_m), most_m: expected.most_m.hypot(most_m) };
         Some(ExpectedAtPoints { all, each_m })
