@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::posture::{Before, Finder, Known, same_posture};
-use super::program::{Approach, Arrival, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
+use super::program::{Approach, Arrival, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood, Way};
 use super::reason::{LeftReason, Why};
 use crate::model::robot::Robot;
 
@@ -92,7 +92,7 @@ fn arrivals(target: &Target) -> Vec<Arrival> {
     }
     let posture = match &target.kind {
         TargetKind::Pose(pose) => pose.posture.clone(),
-        TargetKind::Joints(_) => MeantPosture::Nearest,
+        TargetKind::Joints(_) => MeantPosture::ByWay(Way::Joints),
     };
     vec![Arrival { from: target.approach, posture }]
 }
@@ -158,7 +158,7 @@ impl Meaning<'_> {
             TargetKind::Joints(_) => true,
             TargetKind::Pose(pose) => match arrival.posture {
                 MeantPosture::Coded(..) | MeantPosture::Unheeded(..) | MeantPosture::Near(_) => true,
-                MeantPosture::Nearest | MeantPosture::Along | MeantPosture::OnPath => pose.taught.is_some(),
+                MeantPosture::ByWay(_) => pose.taught.is_some(),
                 MeantPosture::Either(..) => false,
             },
         }

@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::codes::{Branch, Codes};
-use super::program::{MeantPosture, PoseTarget, Understood};
+use super::program::{MeantPosture, PoseTarget, Understood, Way};
 use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
 use crate::model::inverse::{self, FARTHEST_STATED_RAD, FullTurns, POSTURE_STARTS, Reach, SAME_READING};
@@ -174,16 +174,16 @@ fn by_either(coded: Understood<Posture>, way: Understood<Posture>) -> Understood
 }
 
 /// The way there must not lead to another posture than that of codes which count for nothing on it.
-fn by_way(coded: Understood<Posture>, way: Option<Vec<f64>>, codes: &Codes) -> Understood<Posture> {
+fn by_way(coded: Understood<Posture>, way: Option<Posture>, codes: &Codes) -> Understood<Posture> {
     match (coded, way) {
-        (Ok((coded, _)), Some(way)) if farthest(&coded, &way) > SAME_READING => {
+        (Ok((coded, _)), Some((way, _))) if farthest(&coded, &way) > SAME_READING => {
             let words = format!(
                 "its posture is not known: the way there leads to another one than {}, which no path of the tool heeds (--nearest-posture heeds no codes)",
                 codes.shown()
             );
             Err(Why::new(LeftReason::PostureUnknown, words))
         }
-        (Err(_), Some(way)) => Ok((way, Known::Line)),
+        (Err(_), Some(way)) => Ok(way),
         (coded, _) => coded,
     }
 }
@@ -224,25 +224,21 @@ impl<'a> Finder<'a> {
     /// Joints by which the controller reaches a pose.
     pub fn joints(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<Posture> {
         match (&pose.posture, &pose.taught) {
-            (MeantPosture::Coded(codes, axes), _) => self.by_codes(pose, held, before, (codes, axes)),
-            (MeantPosture::Either(codes, axes), _) => {
+            (MeantPosture::Coded(codes, axes, _), _) => self.by_codes(pose, held, before, (codes, axes)),
+            (MeantPosture::Either(codes, axes, way), _) => {
                 let coded = self.by_codes(pose, held, before, (codes, axes));
-                by_either(coded, self.by_approach(pose, held, before))
+                by_either(coded, self.by_approach(pose, held, before, *way))
             }
-            (MeantPosture::Unheeded(codes, axes), _) => {
-                let way = before.readings.filter(|_| before.straight).and_then(|q| self.along(pose, held, q));
-                by_way(self.by_codes(pose, held, before, (codes, axes)), way, codes)
+            (MeantPosture::Unheeded(codes, axes, way), _) => {
+                let by_tool = before.readings.filter(|_| before.straight).map(|q| self.by_tool(pose, held, q, *way));
+                by_way(self.by_codes(pose, held, before, (codes, axes)), by_tool.and_then(Result::ok), codes)
             }
             (MeantPosture::Near(q), _) => {
                 let found = self.near(pose, held, q, Choice::Clear)?;
                 self.is_beside(pose, q, &found).then_some((found, Known::Near)).ok_or_else(contradicted)
             }
-            (MeantPosture::Nearest | MeantPosture::Along | MeantPosture::OnPath, Some(q)) => {
-                Ok((self.near(pose, held, q, Choice::Clear)?, Known::Taught))
-            }
-            (MeantPosture::Nearest | MeantPosture::Along | MeantPosture::OnPath, None) => {
-                self.by_approach(pose, held, before)
-            }
+            (MeantPosture::ByWay(_), Some(q)) => Ok((self.near(pose, held, q, Choice::Clear)?, Known::Taught)),
+            (MeantPosture::ByWay(way), None) => self.by_approach(pose, held, before, *way),
         }
     }
 
@@ -255,17 +251,11 @@ impl<'a> Finder<'a> {
     }
 
     /// The posture that goes on from the target before, or the one next to `--start`.
-    fn by_approach(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<Posture> {
+    fn by_approach(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>, way: Way) -> Understood<Posture> {
         let written = pose.joint_fields.iter().any(Option::is_some);
         let choice = if written { Choice::Nearest } else { Choice::Clear };
         match (before.readings, self.start) {
-            (Some(q), _) if before.straight && pose.posture == MeantPosture::Along => match self.along(pose, held, q) {
-                Some(found) => Ok((found, Known::Line)),
-                None => Err(self.near(pose, held, q, Choice::Nearest).err().unwrap_or_else(line_not_followed)),
-            },
-            (Some(q), _) if before.straight && pose.posture == MeantPosture::OnPath => {
-                Ok((self.near(pose, held, q, Choice::Unparted)?, Known::Path))
-            }
+            (Some(q), _) if before.straight && way != Way::Joints => self.by_tool(pose, held, q, way),
             (Some(q), _) => Ok((self.near(pose, held, q, choice)?, Known::Before)),
             (None, Some(start)) => Ok((self.near(pose, held, start, choice)?, Known::Start)),
             (None, None) if written => Ok((self.near(pose, held, &self.middle.clone(), choice)?, Known::Any)),
@@ -274,6 +264,17 @@ impl<'a> Finder<'a> {
                     "its posture is not known: nothing tells the joints from which the robot comes (give --start)";
                 Err(Why::new(LeftReason::PostureUnknown, words))
             }
+        }
+    }
+
+    /// The posture to which a line or another path of the tool from `q` leads.
+    fn by_tool(&mut self, pose: &PoseTarget, held: &[bool], q: &[f64], way: Way) -> Understood<Posture> {
+        if way == Way::Path {
+            return Ok((self.near(pose, held, q, Choice::Unparted)?, Known::Path));
+        }
+        match self.along(pose, held, q) {
+            Some(found) => Ok((found, Known::Line)),
+            None => Err(self.near(pose, held, q, Choice::Nearest).err().unwrap_or_else(line_not_followed)),
         }
     }
 

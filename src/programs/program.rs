@@ -311,39 +311,58 @@ impl DisplacedTarget {
     }
 }
 
-/// Which of the postures that reach a pose is meant.
+/// How the robot goes to a target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// By its joints: to the posture next to that before.
+    Joints,
+    /// A straight line of the tool: to the posture to which it leads.
+    Line,
+    /// Another path of the tool: no singular posture lies on it.
+    Path,
+}
+
+/// Which of the postures that reach a pose is meant; the six readings beside codes are those of axes 1 to 6.
 #[derive(Debug, Clone, PartialEq)]
 pub enum MeantPosture {
-    /// That next to the target before.
-    Nearest,
-    /// That to which a straight line of the tool from the target before leads.
-    Along,
-    /// That to which another path of the tool from the target before leads: no singular posture lies on it.
-    OnPath,
-    /// That of the codes where the controller heeds them, else that next to the target before: the text does not tell which.
-    Either(Codes, [usize; 6]),
+    /// That to which the way from the target before leads.
+    ByWay(Way),
+    /// That of the codes where the controller heeds them, else that to which the way leads: the text does not tell which.
+    Either(Codes, [usize; 6], Way),
     /// That next to these joint values, rad or m.
     Near(Vec<f64>),
-    /// That to which the way there leads; codes, which the controller does not heed on it, must not say another one.
-    Unheeded(Codes, [usize; 6]),
-    /// That of the codes in the text; the six readings are those of axes 1 to 6.
-    Coded(Codes, [usize; 6]),
+    /// That to which the way leads; codes, which the controller does not heed on it, must not say another one.
+    Unheeded(Codes, [usize; 6], Way),
+    /// That of the codes in the text, on this way.
+    Coded(Codes, [usize; 6], Way),
 }
 
 impl MeantPosture {
+    /// The same on another way.
+    pub fn on(self, way: Way) -> Self {
+        match self {
+            Self::ByWay(_) => Self::ByWay(way),
+            Self::Either(codes, axes, _) => Self::Either(codes, axes, way),
+            Self::Unheeded(codes, axes, _) => Self::Unheeded(codes, axes, way),
+            Self::Coded(codes, axes, _) => Self::Coded(codes, axes, way),
+            Self::Near(_) => self,
+        }
+    }
+
     fn heed_no_codes(&mut self) {
         match self {
-            Self::Unheeded(..) => *self = Self::Along,
-            Self::Coded(..) | Self::Either(..) => *self = Self::Nearest,
-            Self::Nearest | Self::Along | Self::OnPath | Self::Near(_) => {}
+            Self::Unheeded(.., way) | Self::Coded(.., way) | Self::Either(.., way) => *self = Self::ByWay(*way),
+            Self::ByWay(_) | Self::Near(_) => {}
         }
     }
 
     /// Codes that stand in the text, heeded or not.
     pub fn codes(&self) -> Option<(&Codes, &[usize; 6])> {
         match self {
-            Self::Coded(codes, axes) | Self::Either(codes, axes) | Self::Unheeded(codes, axes) => Some((codes, axes)),
-            Self::Nearest | Self::Along | Self::OnPath | Self::Near(_) => None,
+            Self::Coded(codes, axes, _) | Self::Either(codes, axes, _) | Self::Unheeded(codes, axes, _) => {
+                Some((codes, axes))
+            }
+            Self::ByWay(_) | Self::Near(_) => None,
         }
     }
 }

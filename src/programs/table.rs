@@ -12,7 +12,7 @@ use super::compensate::empty_cells;
 use super::external::{NO_AXIS, OffZero};
 use super::field::{Edit, Field, FieldPlace};
 use super::program::{
-    Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind,
+    Approach, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target, TargetKind, Way,
 };
 use super::reason::Why;
 use super::text_file::TextFile;
@@ -324,7 +324,8 @@ impl Table<'_> {
         }
         let empty = |c: &usize| row.cells[*c].is_empty();
         let given = !self.columns.joints.is_empty() && !self.columns.joints.iter().all(empty);
-        let posture = if given { MeantPosture::Near(self.joints(row)?.readings) } else { MeantPosture::Nearest };
+        let posture =
+            if given { MeantPosture::Near(self.joints(row)?.readings) } else { MeantPosture::ByWay(Way::Joints) };
         let joint_fields = if given { self.joint_fields(row)? } else { self.new_joint_fields(row)? };
         Ok(PoseTarget {
             position: [field(0)?, field(1)?, field(2)?],

@@ -1,7 +1,9 @@
 //! Targets to which several ways lead: they are corrected where all of these mean the same posture.
 
-use crate::programs_support::text::{START, UNCHECKED, beside, pose_text, robtarget, script_pose, told};
-use crate::programs_support::{Cell, assert_brings_to, krl_frame};
+use crate::programs_support::text::{
+    START, UNCHECKED, beside, confdata, jointtarget, pose, pose_text, robtarget, script_pose, told,
+};
+use crate::programs_support::{Cell, assert_brings_to, krl_frame, numbers, status_turn};
 use robotcal::programs::LeftReason;
 
 /// Nearly the same pose in another posture: the wrist is turned over.
@@ -206,4 +208,42 @@ fn a_line_that_cannot_be_followed_leaves_its_target() {
     };
     assert_eq!(told(&cell, &[("a.src", text(1.6))], &[]), (1, unknown(1)));
     assert_eq!(told(&cell, &[("a.src", text(0.3))], &[]), (2, Vec::new()));
+}
+
+/// Status and turn count for nothing on an arc, too: those of a wrist that would have to turn over on the way are not believed, though no chord leads there.
+#[test]
+fn codes_of_an_arc_are_held_against_it() {
+    let cell = Cell::kuka(119);
+    let [_, b, c, d, e, f] = START;
+    let at = |turn: f64| vec![turn, b, c, d, e, f];
+    let (s, t) = status_turn(&at(2.6));
+    let text = |(s, t): (u32, u32)| {
+        let [aux, end] = [0.0, 2.6].map(|turn| pose_text(&cell, &at(turn)));
+        let from = krl_joints(&at(-2.6));
+        format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {from}\nCIRC {{{aux}}},{{{end},S {s},T {t}}}\nEND\n")
+    };
+    let flipped = (s ^ 4, t ^ 0b111000);
+    for (codes, flags, wanted) in [
+        ((s, t), &[][..], (3, Vec::new())),
+        (flipped, &[], (2, unknown(1))),
+        (flipped, &["--nearest-posture"], (3, Vec::new())),
+    ] {
+        assert_eq!(told(&cell, &[("a.src", text(codes))], flags), wanted, "{codes:?} {flags:?}");
+    }
+}
+
+/// Where no codes are heeded a line still leads to its own posture, not to the nearest one.
+#[test]
+fn a_line_whose_codes_are_not_heeded_is_followed() {
+    let cell = Cell::kuka(120);
+    let q = wrist([-2.95, 0.6, 2.9]);
+    let target = robtarget(&cell.nominal.base_from_tip(&q), &confdata(&wrist([0.0, 0.6, 0.0])));
+    let from = jointtarget(&wrist([0.0, 0.6, 0.0]));
+    let text = format!(
+        "MODULE m\nPROC main()\nMoveAbsJ {from},v100,fine,tool0;\nMoveL {target},v100,fine,tool0;\nENDPROC\nENDMODULE\n"
+    );
+    let file = cell.write("m.mod", text.as_bytes());
+    let new = cell.compensate(&[&file], &["--unordered", "--nearest-posture"]).expect(0).text("m.mod");
+    let line = new.lines().find(|l| l.starts_with("MoveL")).unwrap();
+    assert_brings_to(&cell, &pose(&numbers(line)), &q, line);
 }

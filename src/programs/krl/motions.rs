@@ -6,7 +6,7 @@ use super::frames::Frames;
 use super::moves::NULL_FRAME;
 use super::{EXTERNAL_NAMES, Module, POSE_NAMES, Value};
 use crate::error::{Code, Error, Result};
-use crate::programs::program::{MeantPosture, Target, TargetKind, Understood};
+use crate::programs::program::{MeantPosture, Target, TargetKind, Understood, Way};
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::Reader;
 
@@ -23,11 +23,14 @@ const COMPONENTS: usize = 6;
 
 /// The posture that a motion means: on paths of the tool, status and turn are not heeded.
 fn posture_of(motion: &str, stated: MeantPosture) -> MeantPosture {
+    let way = match motion {
+        _ if OF_JOINTS.contains(&motion) => Way::Joints,
+        _ if LINES.contains(&motion) => Way::Line,
+        _ => Way::Path,
+    };
     match stated {
-        MeantPosture::Nearest if LINES.contains(&motion) => MeantPosture::Along,
-        MeantPosture::Nearest if !OF_JOINTS.contains(&motion) => MeantPosture::OnPath,
-        MeantPosture::Coded(codes, axes) if !OF_JOINTS.contains(&motion) => MeantPosture::Unheeded(codes, axes),
-        stated => stated,
+        MeantPosture::Coded(codes, axes, _) if way != Way::Joints => MeantPosture::Unheeded(codes, axes, way),
+        stated => stated.on(way),
     }
 }
 

@@ -29,7 +29,7 @@ use super::itinerary::Itinerary;
 use super::names::{plain_error, plain_names};
 use super::program::{
     Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
-    TargetKind, Understood,
+    TargetKind, Understood, Way,
 };
 use super::reason::{DeclaredPoint, LeftReason, Why};
 use super::references::References;
@@ -285,15 +285,15 @@ impl Task<'_> {
                 "axis 4 is locked, or may be (SingArea\\LockAxis4): the tool turns as it can, whatever the target says";
             return Err(Why::new(LeftReason::OrientationKept, words));
         }
-        let near = match targets_of(&upper) {
-            _ if is_of_joints(&upper) => MeantPosture::Nearest,
-            Some(targets) if targets.count == TWO_POINTS => MeantPosture::OnPath,
-            _ => MeantPosture::Along,
+        let way = match targets_of(&upper) {
+            _ if is_of_joints(&upper) => Way::Joints,
+            Some(targets) if targets.count == TWO_POINTS => Way::Path,
+            _ => Way::Line,
         };
         pose.posture = match (*self.switching.now().watched[usize::from(!is_of_joints(&upper))].value(), pose.posture) {
-            (Watched::Off, _) => near,
-            (Watched::Unknown, MeantPosture::Coded(codes, axes)) => MeantPosture::Either(codes, axes),
-            (_, posture) => posture,
+            (Watched::Off, _) => MeantPosture::ByWay(way),
+            (Watched::Unknown, MeantPosture::Coded(codes, axes, _)) => MeantPosture::Either(codes, axes, way),
+            (_, posture) => posture.on(way),
         };
         Ok(TargetKind::Pose(pose))
     }
@@ -407,10 +407,10 @@ impl Task<'_> {
         };
         let axes = self.setting.axes;
         let posture = match axes.get(..6).and_then(|a| <[usize; 6]>::try_from(a).ok()) {
-            None => MeantPosture::Nearest,
+            None => MeantPosture::ByWay(Way::Joints),
             Some(six) => {
                 let cf = cf.map(|(value, range)| PostureCode { file, range, value: value as i64 });
-                MeantPosture::Coded(Codes::Rapid(Box::new(cf)), six)
+                MeantPosture::Coded(Codes::Rapid(Box::new(cf)), six, Way::Joints)
             }
         };
         if let Some((axis, value)) = foreign_axis(&external, axes.len()).filter(|_| !self.setting.axes_apart) {

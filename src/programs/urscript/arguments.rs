@@ -1,8 +1,8 @@
 //! Arguments of calls that move: values, and `get_inverse_kin` around a pose.
 
-use super::{Argument, Script, Value, Way, pose_of};
+use super::{Argument, Script, Value, pose_of};
 use crate::error::Result;
-use crate::programs::program::MeantPosture;
+use crate::programs::program::{MeantPosture, Way};
 use crate::programs::reason::{DeclaredPoint, LeftReason, Why};
 use crate::programs::scan::TokenKind;
 
@@ -24,12 +24,12 @@ impl Script<'_> {
         let taught = self.taught();
         let value = self.argument()?;
         let keeps = way != Way::Joints || matches!(value, Value::Pose(..));
-        Ok(Argument { taught, posture: way.posture(), keeps, ..self.untaught(value) })
+        Ok(Argument { taught, posture: MeantPosture::ByWay(way), keeps, ..self.untaught(value) })
     }
 
     /// A value with the active tool, to which the robot goes in its posture.
     fn untaught(&self, value: Value) -> Argument {
-        let (posture, tool) = (MeantPosture::Nearest, self.active_tool());
+        let (posture, tool) = (MeantPosture::ByWay(Way::Joints), self.active_tool());
         Argument { value, taught: None, posture, tool, points: Vec::new(), keeps: true, turns_as_told: true }
     }
 

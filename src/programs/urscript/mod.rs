@@ -15,6 +15,7 @@ use super::flow::{Branching, Flow, Places, settled};
 use super::itinerary::{Itinerary, Stands};
 use super::program::{
     JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, StatedFrame, Target, TargetKind, Understood,
+    Way,
 };
 use super::reason::{DeclaredPoint, LeftReason, Why};
 use super::routines::Routines;
@@ -32,32 +33,14 @@ const MOVES: [(&[u8], usize, Way); 8] = [
     (b"movej", 1, Way::Joints),
     (b"movel", 1, Way::Line),
     (b"movep", 1, Way::Line),
-    (b"movec", 2, Way::Arc),
+    (b"movec", 2, Way::Path),
     (b"servoj", 1, Way::Joints),
-    (b"servoc", 1, Way::Arc),
+    (b"servoc", 1, Way::Path),
     (b"optimovej", 1, Way::Joints),
     (b"optimovel", 1, Way::Line),
 ];
 /// Decimals in rad and m.
 const DECIMALS: usize = 8;
-
-/// How the tool gets to a target.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
-    Joints,
-    Line,
-    Arc,
-}
-
-impl Way {
-    fn posture(self) -> MeantPosture {
-        match self {
-            Self::Joints => MeantPosture::Nearest,
-            Self::Line => MeantPosture::Along,
-            Self::Arc => MeantPosture::OnPath,
-        }
-    }
-}
 
 /// What stands where a target may stand.
 #[derive(Debug, Clone)]
