@@ -155,6 +155,7 @@ codes! {
         CountsAsAngles "counts_as_angles" "readings said to be angles are counts of encoders",
         MillimetresAsMetres "millimetres_as_metres" "readings of a prismatic joint are millimetres, centimetres, inches or feet",
         JointMissing "joint_missing" "a joint of the chain has no readings",
+        JointColumnsEqual "joint_columns_equal" "two joints that move read the same at every stop",
         JointUnused "joint_unused" "readings are of no joint of the chain",
         JointUnusedMoves "joint_unused_moves" "readings of no joint of the URDF differ from stop to stop",
         CovariatesUnused "covariates_unused" "measured torques or temperatures are not used",

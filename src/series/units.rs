@@ -273,6 +273,7 @@ pub(super) fn notices(file: &Path, (stops, view): (&Stops, bool), unit: AngleUni
         }
     }
     notices.extend(unused_covariates(file, stops));
+    notices.extend(equal_columns(file, stops, chain));
     let Ok(columns) = columns_of(file, stops, chain) else { return notices };
     for (reading, column) in columns.into_iter().enumerate() {
         notices.extend(beyond_limits(file, (stops, view), unit, chain, (reading, column)));
@@ -295,6 +296,18 @@ fn differs(stops: &Stops, joint: &str) -> bool {
 /// Whether a column differs, and otherwise than a clock or a counter.
 fn varies(stops: &Stops, joint: &str) -> bool {
     differs(stops, joint) && !column(stops, joint).windows(2).all(|pair| pair[0] < pair[1])
+}
+
+/// Joints that move and read the same to the last digit at every stop.
+fn equal_columns(file: &Path, stops: &Stops, chain: &Chain) -> Option<Notice> {
+    let moving = |joint: &&String| differs(stops, joint) && column(stops, joint).len() >= MANY_STOPS;
+    let joints: Vec<&String> = chain.readings.iter().filter(moving).collect();
+    let mut pairs =
+        joints.iter().enumerate().flat_map(|(k, one)| joints[k + 1..].iter().map(move |other| (one, other)));
+    let (one, other) = pairs.find(|(one, other)| column(stops, one) == column(stops, other))?;
+    let what = format!("the columns {one} and {other} are equal at every stop");
+    let remedy = "one of them is a copy of the other: write what the joint reads (of joints that are coupled, the URDF has one with mimic)";
+    Some(Notice::new(Code::JointColumnsEqual, file.display(), what, remedy))
 }
 
 /// Joints of the URDF that a chain does not need.

@@ -314,6 +314,18 @@ fn values_beyond_limits_are_noticed_by_name() {
     assert_says(&notices[0], Code::JointBeyondLimits, &["joints.csv:2", "a.png", "j2", "2.25", "-2 to 2", "1 of 3"]);
 }
 
+/// A copied column leaves a readable table whose robot nobody has.
+#[test]
+fn joints_that_read_the_same_at_every_stop_are_named() {
+    let codes = |last: &str| {
+        let joints = format!("image,j1,j2,x\na.png,0.1,0.1,0.5\nb.png,-0.7,-0.7,0.25\noff.png,0.3,{last},0.5\n");
+        let notices = read(series_with(&[("joints.csv", &joints)]).path()).unwrap().reading_notices(&chain());
+        notices.iter().map(|n| n.code).collect::<Vec<_>>()
+    };
+    assert_eq!(codes("0.3"), [Code::JointColumnsEqual]);
+    assert_eq!(codes("0.30001"), []);
+}
+
 /// Readings of three joints x, j1, j2 of `chain` from a table of that order.
 fn with_readings(unit: AngleUnit, rows: &[[f64; 3]]) -> Result<(), Error> {
     let mut series = read(series_with(&[]).path()).unwrap();
