@@ -138,21 +138,19 @@ pub(super) fn smallest_singular_value(robot: &Robot, q: &[f64], held: &[bool]) -
     gram.max(0.0).sqrt()
 }
 
-/// Sign of the determinant of the Jacobian by six free readings; `None` of other than six. It changes where a singular posture is passed.
-fn side(robot: &Robot, q: &[f64], held: &[bool]) -> Option<bool> {
-    let jacobian = jacobian(robot, q, held);
-    (jacobian.ncols() == 6).then(|| jacobian.fixed_columns::<6>(0).determinant() > 0.0)
+/// Readings on the way from one posture to another.
+fn between(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
+    from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect()
 }
 
 /// True where a singular posture lies between two of six free readings: there the determinant of the Jacobian changes its sign.
 pub(super) fn is_parted(robot: &Robot, from: &[f64], to: &[f64], held: &[bool]) -> bool {
-    let side_at = |k: usize| {
-        let share = k as f64 / BETWEEN as f64;
-        let q: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect();
-        side(robot, &q, held)
+    let sign = |k: usize| {
+        let jacobian = jacobian(robot, &between(from, to, k as f64 / BETWEEN as f64), held);
+        (jacobian.ncols() == 6).then(|| jacobian.fixed_columns::<6>(0).determinant() > 0.0)
     };
-    let first = side_at(0);
-    (1..=BETWEEN).any(|k| side_at(k) != first)
+    let first = sign(0);
+    (1..=BETWEEN).any(|k| sign(k) != first)
 }
 
 fn unreached(posture: &str) -> Why {
@@ -162,14 +160,13 @@ fn unreached(posture: &str) -> Why {
 
 /// The codes and the way there must mean the same, where it is not known which of them counts.
 fn by_either(coded: Understood<Posture>, way: Understood<Posture>) -> Understood<Posture> {
-    let open = "its posture is not known: the check of configurations may be switched off, and its confdata";
-    let remedy = "(--nearest-posture heeds no confdata)";
-    let unknown = |why: &str| Err(Why::new(LeftReason::PostureUnknown, format!("{open} {why} {remedy}")));
     match (coded, way) {
         (Ok(coded), Ok((near, _))) if farthest(&coded.0, &near) < SAME_READING => Ok(coded),
-        (Ok(_), Ok(_)) => unknown("mean another one than the way there"),
-        (Ok(_), Err(_)) => unknown("may not count"),
-        (Err(_), way) => way,
+        (Ok(_), Ok(_)) => {
+            let words = "its posture is not known: the check of configurations may be switched off, and its confdata mean another one than the way there (--nearest-posture heeds no confdata)";
+            Err(Why::new(LeftReason::PostureUnknown, words))
+        }
+        (_, way) => way,
     }
 }
 
@@ -285,8 +282,10 @@ impl<'a> Finder<'a> {
     /// The solution next to `q` of those that will do.
     fn near(&mut self, pose: &PoseTarget, held: &[bool], q: &[f64], choice: Choice) -> Understood<Vec<f64>> {
         let (wanted, near) = (pose.base_from_flange(), Self::fixed(pose, q));
-        let (robot, of_place) = (self.robot, side(self.robot, &near, held));
-        let will_do = |found: &[f64]| choice != Choice::Unparted || side(robot, found, held) == of_place;
+        let robot = self.robot;
+        // From a singular posture a path leads to either side.
+        let is_filtered = choice == Choice::Unparted && smallest_singular_value(robot, &near, held) >= SINGULAR;
+        let will_do = |found: &[f64]| !is_filtered || !is_parted(robot, &near, found, held);
         if let Some(found) = self.solved(&wanted, &near, &near, held, None)
             && farthest(&near, &found) < NEAR
             && will_do(&found)
@@ -314,24 +313,28 @@ impl<'a> Finder<'a> {
         }
     }
 
-    /// The solution to which a straight line of the tool leads, in shorter steps where a joint turns quickly; `None` where a singular posture or a limit
-    /// lies on it.
+    /// The solution to which a straight line of the tool leads, in shorter steps where a joint turns quickly; `None` where one would have to jump or a limit
+    /// lies on it. Axes beside the pose go to their values as the tool goes.
     fn along(&self, pose: &PoseTarget, held: &[bool], q: &[f64]) -> Option<Vec<f64>> {
         let tool = pose.flange_from_tool;
         let (first, last) = (self.robot.base_from_tip(q) * tool, pose.base_from_flange() * tool);
         let (turn, way) = first.distance(&last);
         let steps = (turn.max(way) / LINE_STEP).ceil().clamp(1.0, LINE_STEPS);
-        let between = first.inverse() * last;
-        let turned = Pose::new(between.rotation, nalgebra::Vector3::zeros()).log();
+        let whole = first.inverse() * last;
+        let turned = Pose::new(whole.rotation, nalgebra::Vector3::zeros()).log();
         let place = |share: f64| {
             let mut place = first * Pose::exp(&(turned * share));
             place.translation = first.translation * (1.0 - share) + last.translation * share;
             if share == 1.0 { last } else { place }
         };
-        let (mut q, mut share, mut step) = (Self::fixed(pose, q), 0.0, 1.0 / steps);
+        let beside = |share: f64, readings: &[f64]| -> Vec<f64> {
+            let at = between(q, &Self::fixed(pose, q), share);
+            readings.iter().zip(&pose.fixed).zip(at).map(|((own, fixed), at)| fixed.map_or(*own, |_| at)).collect()
+        };
+        let (mut q, mut share, mut step) = (q.to_vec(), 0.0, 1.0 / steps);
         while share < 1.0 {
             let to = f64::min(share + step, 1.0);
-            let next = self.reach(held).solve_from(&(place(to) * tool.inverse()), &q).ok();
+            let next = self.reach(held).solve_from(&(place(to) * tool.inverse()), &beside(to, &q)).ok();
             if let Some(next) = next.filter(|next| farthest(&q, next) <= LINE_TURN) {
                 (q, share, step) = (next, to, f64::min(2.0 * step, 1.0 / steps));
             } else if step * steps > SHORTEST_STEP {

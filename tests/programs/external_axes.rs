@@ -402,6 +402,21 @@ fn the_end_of_a_circle_does_not_take_the_rail_from_the_point_on_it() {
     }
 }
 
+/// The arm hardly moves where the rail goes along with a line, however far that is.
+#[test]
+fn a_line_is_followed_while_the_rail_goes_along() {
+    let robot = on_rail();
+    for rail_m in [0.55, 0.9, 1.5] {
+        let at = pose(&robot, rail_m);
+        let eax = format!("{:.1}", 1e3 * rail_m);
+        let text = format!("{BEGIN}PTP {}\nLIN {}\nEND\n", axes(",E1 500.0"), krl_frame(&at, &format!(",E1 {eax}")));
+        assert_meets_at(&robot, &corrected(&robot, "a.src", &text, None), first_line(&text, "LIN"), rail_m, &text);
+        let begin = format!("MoveAbsJ {},v10,fine,tool0;\n", jointtarget("500"));
+        let text = module(&format!("{begin}MoveL {},v10,fine,tool0;\n", robtarget(&at, &eax)));
+        assert_meets_at(&robot, &corrected(&robot, "m.mod", &text, None), first_line(&text, "MoveL"), rail_m, &text);
+    }
+}
+
 /// An end of which the text does not tell where it stands does not leave the rail out; elements of an array are looked at one by one.
 #[test]
 fn the_end_of_a_circle_that_is_an_element_or_computed_is_left_only_where_it_leaves_the_rail_out() {

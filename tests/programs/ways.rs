@@ -247,3 +247,23 @@ fn a_line_whose_codes_are_not_heeded_is_followed() {
     let line = new.lines().find(|l| l.starts_with("MoveL")).unwrap();
     assert_brings_to(&cell, &pose(&numbers(line)), &q, line);
 }
+
+/// From a stretched wrist a path leads to either side of it: the nearest posture is taken, not that of a sign that is noise.
+#[test]
+fn a_path_from_a_singular_posture_leads_to_either_side_of_it() {
+    let cell = Cell::kuka(130);
+    let rad = |q: [f64; 6]| q.map(f64::to_radians).to_vec();
+    for side in [1.0, -1.0] {
+        for fourth in [0.0, 60.0] {
+            let ends = [rad([4.0, -86.0, 95.0, 0.0, 12.0 * side, 0.0]), rad([8.0, -82.0, 99.0, 0.0, 25.0 * side, 0.0])];
+            let from = krl_joints(&rad([0.0, -90.0, 90.0, fourth, 0.0, -fourth]));
+            let to = ends.iter().map(|q| krl_pose(&cell, q)).collect::<Vec<_>>().join(",");
+            let text = format!("DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {from}\nCIRC {to}\nEND\n");
+            let file = cell.write("a.src", text.as_bytes());
+            let new = cell.compensate(&[&file], &["--unordered"]).expect(0).text("a.src");
+            for (pose, q) in poses_of(&new, "CIRC").iter().zip(&ends) {
+                assert_brings_to(&cell, &krl_frame(pose), q, pose);
+            }
+        }
+    }
+}
