@@ -61,11 +61,6 @@ pub fn turned(angle: f64, near: f64, (low, high): (f64, f64), beyond: &[f64]) ->
     std::iter::once(nearest).chain(beside).find(|v| (low..=high).contains(v)).unwrap_or(angle)
 }
 
-/// Lower and upper limit of every reading that the URDF limits, as [`Chain::stated_limits`].
-pub fn stated_limits(chain: &Chain) -> Vec<Option<(f64, f64)>> {
-    chain.stated_limits()
-}
-
 /// Lower and upper limit of every reading within which a posture is looked for, rad or m.
 pub fn reading_limits(chain: &Chain) -> Vec<(f64, f64)> {
     chain.limits_or(SEARCHED_M)

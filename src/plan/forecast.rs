@@ -9,7 +9,7 @@ use crate::error::{Code, Error, Result};
 use crate::linalg::SymmetricFactor;
 use crate::plan::criterion::Criterion;
 use crate::plan::setting::{PlannedStop, Setting};
-use crate::problem::{Adjustment, names};
+use crate::problem::Adjustment;
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
 
@@ -286,15 +286,18 @@ fn scale_word(plan: &Plan, covariance: &DMatrix<f64>, flange: f64) -> Option<Str
 ///
 /// # Errors
 /// Names the parameter, how far its joint moves, and what to change.
-pub fn check_demand(request: &PlanRequest, forecast: &Forecast) -> Result<()> {
+pub fn check_demand(request: &PlanRequest, plan: &Plan, forecast: &Forecast) -> Result<()> {
     let Demand::Named(wanted) = &request.demand else { return Ok(()) };
+    let layout = &plan.adjustment.problem.layout;
     for name in wanted {
-        let asked: Vec<&ParameterForecast> = forecast.parameters.iter().filter(|p| names(name, &p.name)).collect();
+        let columns = layout.named_within(0..layout.terms.end, "--parameters", name)?;
+        let asked: Vec<&ParameterForecast> = columns.iter().map(|&c| &forecast.parameters[c]).collect();
         if asked.iter().any(|p| p.share_of_data() > LEAST_SHARE) {
             continue;
         }
-        let joint = name.split(['.', '/']).next().unwrap_or(name);
-        let moved = forecast.ranges.iter().find(|r| r.name == joint).map(|r| (r.used().1 - r.used().0, r.kind));
+        let joint = asked.first().and_then(|p| p.name.split(['.', '/']).next());
+        let moved =
+            forecast.ranges.iter().find(|r| Some(r.name.as_str()) == joint).map(|r| (r.used().1 - r.used().0, r.kind));
         let (what, remedy) = match moved {
             Some((span, JointKind::Revolute)) if span < SMALL_RANGE_RAD => (
                 format!("its joint moves over {:.1} degrees only", span.to_degrees()),

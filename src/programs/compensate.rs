@@ -22,7 +22,7 @@ use super::program::{
 use super::reason::{DeclaredPoint, LeftReason, Why};
 use super::shared_points::{Fate, Written, fates};
 use crate::geom::Pose;
-use crate::model::inverse::{self, Reach, Stalled};
+use crate::model::inverse::{Reach, Stalled};
 use crate::model::robot::Robot;
 use crate::urdf::JointKind;
 
@@ -256,7 +256,7 @@ type Worked = (Correction, Vec<Edit>, Option<Later>);
 
 impl<'a> Work<'a> {
     fn new(models: Models<'a>, program: &Program) -> Self {
-        let limits = inverse::stated_limits(&models.to.chain);
+        let limits = models.to.chain.stated_limits();
         let limits: Vec<_> = limits.into_iter().map(|l| l.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))).collect();
         let frames = models.frames.map(|measured| FramesOfProgram::new(measured, &program.targets));
         Self { models, frames, limits, places: Vec::new(), written: Vec::new() }

@@ -53,11 +53,18 @@ pub(super) fn unused_light(series: &Series, of_all: &[PathBuf], views: &[Series]
         views.iter().any(of_view)
     };
     let there = folders.into_iter().flat_map(|folder| NAMES.map(|name| folder.join(name)));
-    let unused = there.filter(|path| path.is_dir() && !is_used(path));
-    let said = unused.map(|path| {
-        let what = "holds images of light, and nothing says of which camera: they are not used";
-        let remedy = "put those of each camera into dark/ and white/ beside or within the folder of its own images";
-        Notice::new(Code::FlatFieldUnused, path.display(), what, remedy)
-    });
+    let holds_images = |path: &Path| path.is_dir() && image_files(path).map_or(true, |files| !files.is_empty());
+    let unused = there.filter(|path| holds_images(path) && !is_used(path));
+    let (what, remedy) = match of_all.len() {
+        1 => (
+            "holds images of light that are not used: another folder of this name, nearer to the images, is",
+            "keep those of one of the two folders",
+        ),
+        _ => (
+            "holds images of light, and nothing says of which camera: they are not used",
+            "put those of each camera into dark/ and white/ beside or within the folder of its own images",
+        ),
+    };
+    let said = unused.map(|path| Notice::new(Code::FlatFieldUnused, path.display(), what, remedy));
     said.collect()
 }

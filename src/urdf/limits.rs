@@ -34,7 +34,7 @@ impl Chain {
         limits.map(|(limits, kind)| limits.unwrap_or((-widest(kind), widest(kind)))).collect()
     }
 
-    /// Ranges of all readings in which the arm takes every posture that it has, rad or m: of a joint that turns farther the turn about zero.
+    /// Ranges of all readings in which the arm takes every posture that it has, rad or m: of a joint that turns farther a turn, about zero where it can.
     pub fn ranges(&self) -> Vec<(f64, f64)> {
         let limits = self.limits_or(UNLIMITED_M).into_iter().zip(&self.reading_kinds);
         limits.map(|(limits, kind)| kind.inner_turn(limits)).collect()
@@ -42,14 +42,13 @@ impl Chain {
 }
 
 impl JointKind {
-    /// What of a range is within a turn: about zero, or, where it lies beside zero, from its nearer end on; the whole of a slide.
+    /// The turn of a wider range that is nearest to the one about zero; the whole of another, and of a slide.
     pub fn inner_turn(self, (low, high): (f64, f64)) -> (f64, f64) {
-        match self {
-            Self::Prismatic => (low, high),
-            _ if low > 0.0 => (low, high.min(low + TAU)),
-            _ if high < 0.0 => (low.max(high - TAU), high),
-            _ => (low.max(-PI), high.min(PI)),
+        if self == Self::Prismatic || high - low <= TAU {
+            return (low, high);
         }
+        let from = (-PI).clamp(low, high - TAU);
+        (from, from + TAU)
     }
 }
 
@@ -74,6 +73,10 @@ mod tests {
         assert_eq!(chain.stated_limits()[3], Some((-0.5, 1.0)));
         assert_eq!(chain.ranges(), [(1.0, 5.0), (4.0, 6.0), (-PI, PI), (-0.5, 1.0)]);
         assert_eq!(JointKind::Revolute.inner_turn((-20.0, -1.0)), (-1.0 - TAU, -1.0));
+        // A turntable from zero on, and a wrist (Panda) that is not centred.
+        for whole in [(0.0, 6.28), (-0.0175, 3.7525)] {
+            assert_eq!(JointKind::Revolute.inner_turn(whole), whole);
+        }
     }
 
     #[test]

@@ -377,6 +377,11 @@ fn impossible_wishes_say_why_and_what_to_change() {
     let (code, _, error) = run(&[&arguments[..], &more].concat());
     assert_eq!(code, 3, "{error}");
     assert_says(&error, Code::PlanUndetermined, &["joint_a2.gear"]);
+    // By its name in full and in short it is the same parameter.
+    for name in ["robot/joint_a2.offset", "joint_a2.offset"] {
+        let (code, _, error) = run(&[&base[..], &["--plate-pose", "0.45,0,0,0,0,0", "--parameters", name]].concat());
+        assert_eq!(code, 0, "{name}: {error}");
+    }
 }
 
 #[test]

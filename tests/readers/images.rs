@@ -102,6 +102,8 @@ fn dark_and_white_images_of_a_series_are_those_of_its_only_camera() {
     let folder = folder(&[&[("series.toml", manifest.as_str()), ("images.csv", images)][..], &light_of_all].concat());
     let series = read(folder.path()).unwrap();
     assert_eq!(light(&series.views()[0]), [1, 2]);
+    std::fs::create_dir_all(folder.path().join("images/dark")).unwrap();
+    let series = read(folder.path()).unwrap();
     assert!(!series.notices.iter().any(|n| n.code == Code::FlatFieldUnused), "{:?}", series.notices);
 }
 

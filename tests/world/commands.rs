@@ -511,6 +511,9 @@ fn targets_of_a_plan_in_another_unit_are_refused() {
         joints
     };
     assert_eq!(plan(1.0, &[]), plan(rad, &["--targets-unit", "rad"]));
+    // A unit of nothing.
+    let alone = ["plan", "--urdf", &urdf, "--plate", paths[0], "--out", paths[2], "--targets-unit", "rad"];
+    assert_eq!(robotcal(&alone).status.code(), Some(2));
 }
 
 /// Programs for a robot are written by the limits.

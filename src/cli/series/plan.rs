@@ -216,7 +216,7 @@ pub fn run(args: &PlanArgs) -> Result<Verdict> {
         words.extend(place_words(&compare_places(&request, &plan)?));
     }
     forecast.words.extend(words);
-    check_demand(&request, &forecast)?;
+    check_demand(&request, &plan, &forecast)?;
     let command = command_of_report();
     let mut more = plan_programs::programs(&request, &plan);
     more.insert("plan.html".into(), plan_html(&request, &plan, &forecast, &command).into_bytes());

@@ -25,7 +25,7 @@ pub(super) struct TargetArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["d_optimal", "parameters"])]
     targets: Option<PathBuf>,
     /// Unit of the revolute joints in that file
-    #[arg(long, value_enum, value_name = "UNIT", default_value = "deg")]
+    #[arg(long, value_enum, value_name = "UNIT", default_value = "deg", requires = "targets")]
     targets_unit: Unit,
 }
 

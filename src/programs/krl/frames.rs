@@ -189,11 +189,11 @@ impl Frames {
     /// Whether `$TOOL` goes with the flange, else why not. Where the text tells neither that nor the tool, it is as the user states.
     pub fn is_on_flange(&self) -> std::result::Result<(), &'static str> {
         match self.ipo_mode {
-            IpoMode::Untold if matches!(self.tool, FrameIs::Known(_)) => {
-                Err("whether the tool is fixed in the room is not known: $IPO_MODE is not written as #BASE or #TCP")
-            }
+            IpoMode::Untold if matches!(self.tool, FrameIs::Known(_)) => Err(
+                "whether the tool is fixed in the room is not known: $IPO_MODE is a value that the text does not tell (write #BASE or #TCP there)",
+            ),
             IpoMode::Base | IpoMode::Untold => Ok(()),
-            IpoMode::Tcp => Err("the tool is fixed in the room ($IPO_MODE #TCP)"),
+            IpoMode::Tcp => Err("the tool is fixed in the room, or may be ($IPO_MODE #TCP)"),
         }
     }
 
