@@ -105,7 +105,7 @@ pub struct PlanArgs {
     /// All parameters of the robot alike, not the flange
     #[arg(long, conflicts_with = "parameters", help_heading = "What is to be accurate")]
     d_optimal: bool,
-    /// These parameters only, for example joint_1 or joint_2.gear
+    /// These parameters only: joint_2.gear, all of joint_1, joint_*.offset
     #[arg(long, value_name = "NAME", value_delimiter = ',', help_heading = "What is to be accurate")]
     parameters: Vec<String>,
     /// Noise of an observation (sigma per axis), px
