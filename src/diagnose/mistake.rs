@@ -16,6 +16,20 @@ pub enum MistakeKind {
         /// The others.
         others: Vec<String>,
     },
+    /// The zero of a joint is far from that of the URDF.
+    Zero {
+        /// The joint.
+        joint: String,
+        /// Degrees that its readings lack.
+        lacking_deg: f64,
+    },
+    /// Readings have the wrong sign, or the zero of another joint is half a turn off, as in a wrist, where both are the same.
+    SignsOrZero {
+        /// The joints of the signs.
+        joints: Vec<String>,
+        /// The joint of the zero.
+        zero: String,
+    },
     /// The axes of an instrument are left-handed, or the readings of these joints have the wrong sign: the arm is its mirror image.
     MirrorImage {
         /// The joints.
@@ -211,10 +225,11 @@ impl Mistake {
         match &self.kind {
             MistakeKind::Signs(joints)
             | MistakeKind::SignsOrMirror { joints, .. }
+            | MistakeKind::SignsOrZero { joints, .. }
             | MistakeKind::Columns(joints)
             | MistakeKind::Rows { columns: joints, .. } => joints,
             MistakeKind::Unit { joint, .. } => joint.as_slice(),
-            MistakeKind::SlideUnit { joint, .. } => std::slice::from_ref(joint),
+            MistakeKind::SlideUnit { joint, .. } | MistakeKind::Zero { joint, .. } => std::slice::from_ref(joint),
             MistakeKind::Coupled { joints, .. } => &joints[..1],
             _ => &[],
         }
@@ -246,6 +261,15 @@ fn signs_changed(joints: &[String]) -> String {
     )
 }
 
+/// Degrees between zeros that are opposite.
+pub const HALF_TURN_DEG: f64 = 180.0;
+
+fn zero_changed(joint: &str, lacking_deg: f64) -> String {
+    format!(
+        "add {lacking_deg} deg to the column {joint} of joints.csv, or turn the origin of {joint} in the URDF by as much about its axis"
+    )
+}
+
 /// How the arm itself tells which way a joint counts.
 fn turned_by_hand(joints: &[String]) -> String {
     let joint = joints.first().map_or("", String::as_str);
@@ -261,7 +285,10 @@ const fn unit(are_degrees: bool) -> [&'static str; 3] {
 impl Kind for Mistake {
     fn code(&self) -> Code {
         match &self.kind {
-            MistakeKind::Signs(_) | MistakeKind::SignsOrMirror { .. } => Code::JointSignWrong,
+            MistakeKind::Signs(_) | MistakeKind::SignsOrMirror { .. } | MistakeKind::SignsOrZero { .. } => {
+                Code::JointSignWrong
+            }
+            MistakeKind::Zero { .. } => Code::ZeroOff,
             MistakeKind::MirrorImage { .. } => Code::AxesMirrored,
             MistakeKind::Columns(_) | MistakeKind::Reversed(_) => Code::JointOrderWrong,
             MistakeKind::Unit { .. } | MistakeKind::SlideUnit { .. } => Code::JointUnitWrong,
@@ -305,6 +332,7 @@ impl Kind for Mistake {
             MistakeKind::Lengths { angle_rad, distance_m, .. } => {
                 all.extend([Quantity::new("angle", angle_rad, "rad"), Quantity::new("distance", distance_m, "m")]);
             }
+            MistakeKind::Zero { lacking_deg, .. } => all.push(Quantity::new("offset", lacking_deg.to_radians(), "rad")),
             MistakeKind::PlateSize { scale, pitch_m } => {
                 all.extend([Quantity::new("plate_size", scale, "1"), Quantity::new("pitch", scale * pitch_m, "m")]);
             }
@@ -332,6 +360,10 @@ impl Kind for Mistake {
             MistakeKind::Signs(joints) => signs_changed(joints),
             MistakeKind::SignsOrMirror { joints, others } => {
                 format!("{}: if it does not, {}; else {}", turned_by_hand(others), signs_changed(others), signs_changed(joints))
+            }
+            MistakeKind::Zero { joint, lacking_deg } => zero_changed(joint, *lacking_deg),
+            MistakeKind::SignsOrZero { joints, zero } => {
+                format!("{}: if it does, {}; else {}", turned_by_hand(joints), zero_changed(zero, HALF_TURN_DEG), signs_changed(joints))
             }
             MistakeKind::MirrorImage { joints, axes } => {
                 format!("{}: if it does, {axes}; else {}", turned_by_hand(joints), signs_changed(joints))
@@ -424,6 +456,13 @@ impl Mistake {
                 "{}; with {} negated, as the mirror image of the arm, they fit alike, and do not tell which",
                 signs_wrong(joints, noun),
                 listed(others)
+            ),
+            MistakeKind::Zero { joint, lacking_deg } => format!(
+                "the zero of {joint} is not that of the URDF: with {lacking_deg} deg added to its readings the {noun}s fit"
+            ),
+            MistakeKind::SignsOrZero { joints, zero } => format!(
+                "{}; with {HALF_TURN_DEG} deg added to those of {zero} they fit alike, and do not tell which",
+                signs_wrong(joints, noun)
             ),
             MistakeKind::MirrorImage { joints, .. } => format!(
                 "its axes are left-handed, or the readings of {} have the wrong sign: either makes the arm its mirror image, with either undone the {noun}s fit, and they do not tell which",

@@ -81,7 +81,7 @@ pub use lost_images::LostImages;
 pub use marker_off::MarkerOff;
 pub use measurement_scatter::MeasurementsScatter;
 pub use mirror_image::MirrorImageFits;
-pub use mistake::{Mistake, MistakeKind, RowsOf, ShiftedPart};
+pub use mistake::{HALF_TURN_DEG, Mistake, MistakeKind, RowsOf, ShiftedPart};
 pub use no_gain::NoGain;
 pub use noticed::Noticed;
 pub use odd_image::OddImage;

@@ -3,6 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{Layout, State};
+use crate::model::joint_terms::Term;
+use crate::model::robot::Robot;
 
 /// Sigma with which directions of a family are held at zero, as a share of its base sigma: far below anything that counts.
 const HELD: f64 = 1e-4;
@@ -11,8 +13,14 @@ const HELD: f64 = 1e-4;
 /// degrees of freedom has 95 % of the factor between 1/2 and 2 (`1.96 / sqrt(2 n) = ln 2`).
 const TWISTS_DRAWN: f64 = 4.0;
 
+/// The same of sag: of arms of all sizes it is known less well, with 95 % of the factor between 1/4 and 4.
+const GRAVITY_DRAWN: f64 = 1.0;
+
 /// Name of the family of the twists.
 const TWISTS: &str = "origins of the joints";
+
+/// Name of that of the sag of joints whose masses are not known.
+const GRAVITY: &str = "gravity";
 
 /// Parameters alike whose prior sigmas have one factor in common, a variance component.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,6 +54,14 @@ impl Family {
         let columns: Vec<usize> =
             layout.twists.clone().filter(|c| !is_stated(*c) && !layout.is_between_bases(*c)).collect();
         (!columns.is_empty()).then(|| Self { drawn: TWISTS_DRAWN, ..Self::new(TWISTS, layout, columns) })
+    }
+
+    /// Sag of the joints where masses are not known and whose priors nobody has stated; `None` without.
+    pub fn of_gravity(layout: &Layout, robot: &Robot, is_stated: impl Fn(usize) -> bool) -> Option<Self> {
+        let terms = layout.terms.clone().zip(&robot.terms);
+        let of_gravity = terms.filter(|(c, t)| matches!(t.term, Term::Gravity { .. }) && !is_stated(*c));
+        let columns: Vec<usize> = of_gravity.map(|(c, _)| c).collect();
+        (!columns.is_empty()).then(|| Self { drawn: GRAVITY_DRAWN, ..Self::new(GRAVITY, layout, columns) })
     }
 
     /// True for the family of the twists.

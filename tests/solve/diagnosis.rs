@@ -220,6 +220,20 @@ fn mistakes_in_single_columns_are_named() {
         let said = with(&|q| q[2] += sign * q[1]);
         assert_eq!((said.code, said.place.as_str()), (Code::JointCoupled, "joint_a3"), "{said}");
     }
+    // Zeros of another convention.
+    for (joint, name) in [(1, "joint_a2"), (2, "joint_a3"), (3, "joint_a4"), (4, "joint_a5")] {
+        for lacking in [-90.0_f64, 90.0] {
+            let said = with(&|q| q[joint] -= lacking.to_radians());
+            assert_eq!((said.code, said.place.as_str()), (Code::ZeroOff, name), "{said}");
+            assert!((number(&said, "offset") - lacking.to_radians()).abs() < 1e-9, "{said}");
+        }
+    }
+    // In a wrist a zero half a turn off is the sign of the joint behind it, and the other way round: both are named.
+    for change in [|q: &mut Vec<f64>| q[3] += std::f64::consts::PI, |q: &mut Vec<f64>| q[4] = -q[4]] {
+        let said = with(&change);
+        assert_eq!((said.code, said.place.as_str()), (Code::JointSignWrong, "joint_a5"), "{said}");
+        assert!(said.remedy.contains("joint_a4"), "{said}");
+    }
     let said = with(&|q| (q[3], q[4], q[5]) = (q[4], q[5], q[3]));
     assert_eq!((said.code, said.place.as_str()), (Code::JointOrderWrong, "joint_a4, joint_a6, joint_a5"), "{said}");
     let said = with(&|q| q.reverse());

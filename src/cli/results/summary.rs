@@ -111,7 +111,8 @@ fn flange(r: &SolutionRecord) -> Vec<String> {
     let i = e.intervals.as_ref();
     let (alone_m, of_alone) = e.best_urdf_m();
     let at = if r.has_no_robot() { r.flange_holds() } else { "in the range of the stops" };
-    let mut lines = vec![format!("accuracy  expected flange error {at}, RMS{told}:")];
+    let held = if r.hangs_on_a_stated_size() { ", if the plate has its stated size" } else { "" };
+    let mut lines = vec![format!("accuracy  expected flange error {at}, RMS{told}{held}:")];
     if r.has_no_robot() {
         lines.push(row("poses of the controller", alone_m, of_alone));
     } else {

@@ -66,6 +66,7 @@ pub(in crate::identify) fn fit_model(
     options.selection.apply(&mut problem.layout, state, &options.limits)?;
     let stated = options.selection.with_priors(&problem.layout)?;
     problem.families.extend(Family::of_twists(&problem.layout, |c| stated.contains(&c)));
+    problem.families.extend(Family::of_gravity(&problem.layout, &state.robot, |c| stated.contains(&c)));
     if options.marker_tolerance == MarkerTolerance::Estimated {
         problem.noise.marker = vec![1.0; problem.plates.len()];
     }

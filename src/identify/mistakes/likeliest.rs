@@ -4,7 +4,7 @@ use std::mem::discriminant;
 
 use super::readings::signs_of_others;
 use crate::assess::Limits;
-use crate::diagnose::MistakeKind;
+use crate::diagnose::{HALF_TURN_DEG, MistakeKind};
 use crate::error::Code;
 use crate::model::mirror::mirror_images;
 use crate::model::robot::Robot;
@@ -30,7 +30,8 @@ pub(in crate::identify) fn likeliest(
     };
     let fewest = |a: &usize, b: &usize| joints(&tried[*a].1).cmp(&joints(&tried[*b].1)).then(by_left(a, b));
     let named = (0..tried.len()).filter(is_alike).min_by(fewest).unwrap_or(best);
-    Some((named, with_mirror_image(tried, named, robot, limits)))
+    let kind = with_sign_or_zero(tried, named, limits);
+    Some((named, kind.unwrap_or_else(|| with_mirror_image(tried, named, robot, limits))))
 }
 
 /// How many joints it is about, where fewer may fit alike.
@@ -41,12 +42,36 @@ fn joints(kind: &MistakeKind) -> Option<usize> {
     }
 }
 
+/// What fits about as well as a mistake.
+fn alike<'t>(tried: &'t [Explained], named: usize, limits: &Limits) -> impl Iterator<Item = &'t MistakeKind> {
+    let least = tried[named].0 / limits.mistake_explains;
+    tried.iter().filter(move |(left, _)| *left <= least).map(|(_, kind)| kind)
+}
+
+/// Where a wrong sign and a zero half a turn off fit alike, both.
+fn with_sign_or_zero(tried: &[Explained], named: usize, limits: &Limits) -> Option<MistakeKind> {
+    let zero = |kind: &MistakeKind| match kind {
+        MistakeKind::Zero { joint, lacking_deg } if *lacking_deg == HALF_TURN_DEG => Some(joint.clone()),
+        _ => None,
+    };
+    let sign = |kind: &MistakeKind| match kind {
+        MistakeKind::Signs(joints) if joints.len() == 1 => Some(joints.clone()),
+        _ => None,
+    };
+    let kind = &tried[named].1;
+    let (joints, zero) = match (sign(kind), zero(kind)) {
+        (Some(joints), _) => (joints, alike(tried, named, limits).find_map(zero)?),
+        (_, Some(joint)) => (alike(tried, named, limits).find_map(sign)?, joint),
+        _ => return None,
+    };
+    Some(MistakeKind::SignsOrZero { joints, zero })
+}
+
 /// The mistake with what fits alike as the mirror image of the arm, where that was tried.
 fn with_mirror_image(tried: &[Explained], named: usize, robot: &Robot, limits: &Limits) -> MistakeKind {
-    let (left, kind) = &tried[named];
+    let kind = &tried[named].1;
     let mirrors = mirror_images(&robot.chain, limits.suspicious_misfit);
-    let alike =
-        || tried.iter().filter(move |(other, _)| limits.mistake_explains * other <= *left).map(|(_, kind)| kind);
+    let alike = || alike(tried, named, limits);
     let is_alike = |joints: &Vec<String>| alike().any(|kind| *kind == MistakeKind::Signs(joints.clone()));
     let others = |joints: &[String]| {
         let others = mirrors.iter().map(|mirror| signs_of_others(robot, joints, mirror));

@@ -1,6 +1,6 @@
 //! The usual mistakes in joint readings, each undone.
 
-use crate::diagnose::MistakeKind;
+use crate::diagnose::{HALF_TURN_DEG, MistakeKind};
 use crate::model::mirror::mirror_images;
 use crate::model::robot::Robot;
 use crate::series::{LENGTH_UNITS, LengthUnit};
@@ -50,6 +50,9 @@ pub(in crate::identify) fn columns_undone(robot: &Robot, given: &[Vec<f64>]) -> 
             }
         }
         if kinds[k] == JointKind::Revolute {
+            for lacking_deg in [90.0, -90.0, HALF_TURN_DEG] {
+                add(MistakeKind::Zero { joint: names[k].clone(), lacking_deg }, &|q| q[k] += lacking_deg.to_radians());
+            }
             for (are_degrees, factor) in units {
                 let joint = Some(names[k].clone());
                 add(MistakeKind::Unit { joint, are_degrees }, &|q| q[k] *= factor);

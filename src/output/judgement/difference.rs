@@ -76,13 +76,16 @@ pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<Solut
         .into_iter()
         .flat_map(|(record, other)| {
             let other = other.flange();
-            record.workspace.iter().map(move |w| Place {
+            // The first half of a map fills the region of the stops, the other all joint limits.
+            let of_limits = record.workspace.len() / 2;
+            record.workspace.iter().enumerate().map(move |(k, w)| Place {
                 readings: w.readings.clone(),
                 covered: w.covered && other.as_ref().is_some_and(|o| o.at(&w.readings).outside.is_empty()),
+                of_limits: k >= of_limits,
             })
         })
         .collect();
-    let all: Vec<&Place> = places.iter().collect();
+    let all: Vec<&Place> = places.iter().filter(|p| p.of_limits).collect();
     let covered: Vec<&Place> = places.iter().filter(|p| p.covered).collect();
     let everywhere = difference(&first, &second, &all).ok_or_else(|| {
         Error::new(Code::SolutionDiffers, "solutions", "they have no workspace map in common", "identify both again")
@@ -98,7 +101,10 @@ pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<Solut
 
 struct Place {
     readings: Vec<f64>,
+    /// Within the region of the stops of both.
     covered: bool,
+    /// One of those that fill the joint limits.
+    of_limits: bool,
 }
 
 /// Fewest places that determine frames and flange point.
