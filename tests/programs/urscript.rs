@@ -317,8 +317,11 @@ fn the_time_for_many_targets_grows_with_their_number() {
         assert_eq!(count, targets.len());
         seconds
     };
-    let least = |targets: &[Vec<f64>]| (0..3).map(|_| seconds_for(targets)).fold(f64::INFINITY, f64::min);
-    let ratio = least(&table) / least(&table[..1_250]);
+    // In turn, as others may use the machine: what takes least was disturbed least.
+    let [all, some] = (0..6).fold([f64::INFINITY; 2], |[all, some], _| {
+        [all.min(seconds_for(&table)), some.min(seconds_for(&table[..1_250]))]
+    });
+    let ratio = all / some;
     println!("eight times as many targets take {ratio:.1} times as long");
     // Proportional would be 8, the square of the number 64.
     assert!(ratio < 24.0, "{ratio}");
