@@ -13,7 +13,7 @@ use crate::linalg::symmetric_eigen;
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Image, Problem, State, TakenFrom, Weighting, posture_groups, predict};
 use crate::solve::{
-    ComponentOptions, LinearProblem, LinearisedAdjustment, Outcome, Settings, Status, estimate_components,
+    ComponentOptions, LinearProblem, LinearisedAdjustment, Outcome, Parts, Settings, Status, estimate_components,
     side_by_side, solve,
 };
 use crate::stage::stage;
@@ -250,9 +250,9 @@ fn along_the_workspace(Adjustment { problem, state }: &Adjustment, postures: Vec
 /// Error of every held-out image, with its index.
 fn predictions(fit: LinearProblem, folds: &[Vec<usize>], fitted: &Refit) -> Option<Vec<(usize, ImageError)>> {
     let problem = &fit.adjustment.problem;
-    let of_fold = |held: &Vec<usize>| fitted(fit.without_images(held));
-    let states: Vec<State> =
-        side_by_side(problem, folds, |_, held| of_fold(held)).into_iter().collect::<Option<_>>()?;
+    let parts = Parts::of(fit, folds);
+    let of_fold = |k: usize, _: &Vec<usize>| fitted(fit.without_set(folds, k, parts.as_ref()));
+    let states: Vec<State> = side_by_side(problem, folds, of_fold).into_iter().collect::<Option<_>>()?;
     let held: Vec<(usize, &State)> =
         folds.iter().zip(&states).flat_map(|(held, fitted)| held.iter().map(move |&i| (i, fitted))).collect();
     let predicted = held.par_iter().map(|(i, fitted)| Some((*i, predict_image(fit.adjustment, fitted, *i)?)));

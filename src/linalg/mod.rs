@@ -157,6 +157,14 @@ pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     multiply(view(a), view(b))
 }
 
+/// Product of the upper triangle of the square matrix `a` with `b`; what lies below is not read.
+pub fn upper_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let (upper, full) = (BlockStructure::TriangularUpper, BlockStructure::Rectangular);
+    let mut c = DMatrix::zeros(a.nrows(), b.ncols());
+    triangular::matmul(view_mut(&mut c), full, Accum::Replace, view(a), upper, view(b), full, 1.0, Par::Seq);
+    c
+}
+
 /// Product of the transpose of `a` with `b`.
 pub fn transposed_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     multiply(view(a).transpose(), view(b))
@@ -401,6 +409,15 @@ mod tests {
             let inverse = SymmetricFactor::new(&lower).unwrap().inverse();
             assert!((&inverse * &m - DMatrix::identity(n, n)).amax() < 1e-12, "{n}");
         }
+    }
+
+    #[test]
+    fn the_product_of_a_triangle_does_not_read_the_other() {
+        let mut a = DMatrix::from_fn(37, 37, |i, j| ((3 * i + 5 * j) as f64).sin());
+        let b = DMatrix::from_fn(37, 5, |i, j| ((i + 7 * j) as f64).cos());
+        let expected = a.upper_triangle() * &b;
+        a.fill_lower_triangle(f64::NAN, 1);
+        assert!((upper_product(&a, &b) - expected).amax() < 1e-13);
     }
 
     #[test]

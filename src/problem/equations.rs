@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix3x2, Matrix6x2, SMatrix, SVector, Vector2, Vector3};
 
-use crate::linalg::{gram, product, product_with_rows};
+use crate::linalg::{gram, product};
 use crate::model::camera::MAX_PARAMETERS;
 use crate::model::circle::Prediction;
 use crate::model::plate_modes::MODES;
@@ -140,11 +140,6 @@ impl Equations {
         let rows = self.columns.nrows();
         let pairs = self.columns.as_slice().chunks_exact(2 * rows).map(move |pair| pair.split_at(rows));
         pairs.enumerate().map(|(k, (first, second))| Sight { equations: [first, second], field: self.field.of(k) })
-    }
-
-    /// Derivatives by unknowns that move the pose as `pose_by` says (unknowns x 6), one column an equation.
-    pub fn through_pose(&self, pose_by: &DMatrix<f64>) -> DMatrix<f64> {
-        product_with_rows(pose_by, &self.columns, self.pose_rows())
     }
 
     /// Rows of the pose.

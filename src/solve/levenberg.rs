@@ -181,10 +181,14 @@ struct Model {
 
 impl Model {
     fn new(which: Elimination, linear: LinearProblem, lambda: f64) -> Option<Self> {
-        let system = System::with(which, linear, lambda);
-        let factor = system.factor(linear).inspect_err(|singular| tracing::debug!(lambda, "{singular}")).ok()?;
         let is_whole = which != Elimination::StopsMarkersHeld || linear.adjustment.problem.plates.is_empty();
-        Some(Self { system, factor, lambda, is_whole, is_curved: false, decrement: f64::INFINITY })
+        Some(Self { is_whole, ..Self::of(System::with(which, linear, lambda), linear, lambda)? })
+    }
+
+    /// Of a whole system.
+    fn of(system: System, linear: LinearProblem, lambda: f64) -> Option<Self> {
+        let factor = system.factor(linear).inspect_err(|singular| tracing::debug!(lambda, "{singular}")).ok()?;
+        Some(Self { system, factor, lambda, is_whole: true, is_curved: false, decrement: f64::INFINITY })
     }
 
     /// The covariance, where the model stands for the end of the iteration.
@@ -209,6 +213,8 @@ struct Proposal {
 
 /// What proposes the steps.
 struct Proposer {
+    /// The system of the first model, where it is known.
+    first: Option<System>,
     model: Option<Model>,
     /// Decrement of the step before, where that step was taken.
     before: Option<f64>,
@@ -218,7 +224,7 @@ struct Proposer {
 
 impl Proposer {
     fn new() -> Self {
-        Self { model: None, before: None, bent_below: NEARLY_THERE }
+        Self { first: None, model: None, before: None, bent_below: NEARLY_THERE }
     }
 
     /// The next step; `None` where the information is not positive definite. Where the steps of a model shrink slowly, the robust cost bends
@@ -236,12 +242,11 @@ impl Proposer {
                 curved = linear.lin.with_robust_curvature();
             }
         }
-        let plates = &linear.adjustment.problem.plates;
-        let are_held = plates.iter().flat_map(|p| &p.markers).all(|m| m.sigma_m == 0.0);
-        let which = if are_held { Elimination::StopsMarkersHeld } else { Elimination::cheaper(linear) };
+        let which = Elimination::of_steps(linear);
         let curved = curved.and_then(|lin| Model::new(which, linear.adjustment.linear(&lin), lambda));
-        let mut model = match curved {
-            Some(model) => Model { is_curved: true, ..model },
+        let known = self.first.take().and_then(|system| Model::of(system, linear, 0.0));
+        let mut model = match curved.map(|model| Model { is_curved: true, ..model }).or(known) {
+            Some(model) => model,
             None => Model::new(which, linear, lambda)?,
         };
         let proposal = model.proposal(linear);
@@ -414,7 +419,8 @@ pub(super) fn minimise_with_priors(adjustment: Adjustment, linearised: Linearise
 impl LinearisedAdjustment {
     /// The state at the optimum alone: the last step is taken on trust, and nothing is linearised where it ends.
     pub fn settled(self, settings: &Settings) -> State {
-        let descent = Descent::new(Proposer::new(), self.adjustment, self.linearised);
+        let proposer = Proposer { first: self.system, ..Proposer::new() };
+        let descent = Descent::new(proposer, self.adjustment, self.linearised);
         let mut descent = Descent { is_trusting: true, ..descent };
         descent.run(settings);
         descent.adjustment.state

@@ -1,5 +1,7 @@
 //! An adjustment near its optimum that is linearised where it stands, and what is left of it without some of its images.
 
+use super::elimination::parts::Parts;
+use super::elimination::system::System;
 use super::linear::{LinearProblem, Linearised};
 use crate::problem::Adjustment;
 
@@ -10,13 +12,20 @@ pub struct LinearisedAdjustment {
     pub adjustment: Adjustment,
     /// Its linearisation.
     pub linearised: Linearised,
+    /// Its system there, where that is known.
+    pub(super) system: Option<System>,
 }
 
 impl LinearisedAdjustment {
     /// `None` where a marker lies behind its camera.
     pub fn of(adjustment: Adjustment) -> Option<Self> {
         let linearised = adjustment.linearise()?;
-        Some(Self { adjustment, linearised })
+        Some(Self::new(adjustment, linearised))
+    }
+
+    /// With the linearisation where it stands.
+    pub fn new(adjustment: Adjustment, linearised: Linearised) -> Self {
+        Self { adjustment, linearised, system: None }
     }
 
     /// The linear problem.
@@ -31,6 +40,13 @@ impl LinearProblem<'_> {
         self.left_in(self.adjustment.without_images(held))
     }
 
+    /// Without one of some sets of images, whose system is known from the parts that they make.
+    pub fn without_set(self, sets: &[Vec<usize>], set: usize, parts: Option<&Parts>) -> LinearisedAdjustment {
+        let left = self.without_images(&sets[set]);
+        let system = parts.and_then(|parts| parts.without(set, left.linear()));
+        LinearisedAdjustment { system, ..left }
+    }
+
     /// Without what was measured of bodies at some stops.
     pub fn without_bodies_at(self, stops: &[usize]) -> LinearisedAdjustment {
         self.left_in(self.adjustment.without_bodies_at(stops))
@@ -43,6 +59,6 @@ impl LinearProblem<'_> {
 
     fn left_in(self, adjustment: Adjustment) -> LinearisedAdjustment {
         let linearised = adjustment.left_of(self.lin);
-        LinearisedAdjustment { adjustment, linearised }
+        LinearisedAdjustment::new(adjustment, linearised)
     }
 }

@@ -15,6 +15,7 @@ mod side_by_side;
 mod snoop;
 mod status;
 
+pub use elimination::parts::Parts;
 pub use elimination::seen_markers::SeenMarkers;
 pub use elimination::system::{Elimination, Singular, System};
 pub use levenberg::{Ended, NoFit, Outcome, Settings, solve, solve_near};

@@ -3,9 +3,10 @@
 use crate::support::small::{Dice, Request, problem, series};
 use robotcal::assess::{Limits, hold_out};
 use robotcal::identify::{Options, identify};
+use robotcal::linalg::SymmetricFactor;
 use robotcal::solve::{
-    ComponentOptions, LinearisedAdjustment, Settings, Status, estimate_components, estimate_components_from_above,
-    solve,
+    ComponentOptions, Elimination, LinearisedAdjustment, Parts, Settings, Status, System, estimate_components,
+    estimate_components_from_above, solve,
 };
 
 #[test]
@@ -42,6 +43,39 @@ fn what_is_left_of_a_linearisation_is_the_linearisation_of_what_is_left() {
     assert!((left.linearised.cost / again.linearised.cost - 1.0).abs() < 1e-12);
     let [step, of_again] = [left, again].map(|at| at.settled(&Settings::new(30, 1e-6)));
     assert_eq!(step.robot.twists, of_again.robot.twists);
+}
+
+/// Images that are in no set belong to what is left, too.
+#[test]
+fn the_system_without_some_images_is_the_sum_of_what_the_others_tell() {
+    let mut dice = Dice::new(84);
+    let (problem, truth) = problem(&mut dice, &Request { images: 30, lattice: (5, 4), ..Request::default() });
+    let solution = identify(truth.robot.chain, &[series(&problem)], &Options::default()).unwrap();
+    let whole = solution.fit.linear();
+    let sets: Vec<Vec<usize>> = (0..4).map(|k| whole.lin.images.iter().copied().skip(k).step_by(5).collect()).collect();
+    let parts = Parts::of(whole, &sets).unwrap();
+    for (k, set) in sets.iter().enumerate() {
+        let left = whole.without_images(set);
+        let (linear, mut steps) = (left.linear(), Vec::new());
+        let systems = [parts.without(k, linear).unwrap(), System::with(Elimination::Stops, linear, 0.0)];
+        let sigma: Vec<f64> = systems[1].information.diagonal().iter().map(|d| d.sqrt().recip()).collect();
+        for system in &systems {
+            let x = SymmetricFactor::new(&system.information).unwrap().solve(&system.rhs);
+            steps.push(system.step(linear, &x));
+        }
+        let [sum, own] = &systems;
+        for (i, j) in (0..sigma.len()).flat_map(|i| (0..sigma.len()).map(move |j| (i, j))) {
+            let off = (sum.information[(i, j)] - own.information[(i, j)]) * sigma[i] * sigma[j];
+            assert!(off.abs() < 1e-11, "{k}: {i} {j} {off:e}");
+        }
+        let [a, b] = [&steps[0], &steps[1]];
+        let latents =
+            a.joint_errors.iter().chain(&a.ties).flatten().zip(b.joint_errors.iter().chain(&b.ties).flatten());
+        let dense = a.dense.iter().zip(b.dense.iter()).zip(&sigma).map(|((a, b), sigma)| (a - b) / sigma);
+        assert!(latents.clone().count() >= 6 * linear.lin.stops.len());
+        assert!(latents.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-11);
+        assert!(dense.map(f64::abs).fold(0.0, f64::max) < 1e-6);
+    }
 }
 
 /// Stops of which some tell first where the sizes will be: the same end as from all at once.

@@ -17,7 +17,7 @@ use crate::identify::solution::Solution;
 use crate::problem::{Adjustment, Problem, State};
 use crate::series::CameraMount;
 use crate::simulate::truth::Truth;
-use crate::solve::{LinearisedAdjustment, side_by_side};
+use crate::solve::{LinearisedAdjustment, Parts, side_by_side};
 use crate::stage::stage;
 
 /// Stops beyond which some of them are compared, and how many those are: the ratio of two errors on the same images is then known to a percent.
@@ -155,8 +155,9 @@ fn held_out(
     tick: &(dyn Fn() + Sync),
 ) -> Errors {
     let whole = if known.is_empty() { LinearisedAdjustment::of(joint.clone()) } else { None };
-    let of_fold = |_: usize, fold: &Vec<usize>| -> Errors {
-        let refit = || Some(refitted_near(whole.as_ref()?.linear().without_images(fold)));
+    let parts = whole.as_ref().and_then(|whole| Parts::of(whole.linear(), folds));
+    let of_fold = |k: usize, fold: &Vec<usize>| -> Errors {
+        let refit = || Some(refitted_near(whole.as_ref()?.linear().without_set(folds, k, parts.as_ref())));
         let found = fitted(&joint.without_images(fold), solved, estimators, refit);
         let alike = same_cameras(&found);
         let errors = fold.iter().map(|i| (*i, errors_of(joint, *i, (&found, &alike)))).collect();

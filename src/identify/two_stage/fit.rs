@@ -68,7 +68,7 @@ impl PoseStage {
     pub fn solved(start: &Adjustment) -> Option<LinearisedAdjustment> {
         let outcome = solve_near(with_free_poses(start)?, &AT_POSES);
         let linearised = outcome.linearised.filter(|_| outcome.status == Status::Converged)?;
-        Some(LinearisedAdjustment { adjustment: outcome.adjustment, linearised })
+        Some(LinearisedAdjustment::new(outcome.adjustment, linearised))
     }
 
     /// Of the images that are `left` of those of a solved free-pose adjustment: one step from there. Images have nothing but cameras and plates

@@ -65,19 +65,18 @@ impl DenseCoupling {
     }
 }
 
-/// Markers of an image, each once, and their coupling with what is latent through `l`: latent x 3 markers.
-pub(super) fn latents_with_markers(l: &DMatrix<f64>, equations: &Equations) -> (Vec<usize>, DMatrix<f64>) {
-    let by_latents = equations.through_pose(&l.transpose());
+/// Markers of an image, each once, and their coupling with its pose: 6 x 3 markers.
+pub(super) fn pose_with_markers(equations: &Equations) -> (Vec<usize>, DMatrix<f64>) {
     let mut markers = equations.markers.clone();
     markers.dedup();
-    let mut coupling = DMatrix::zeros(l.ncols(), 3 * markers.len());
+    let mut coupling = DMatrix::zeros(6, 3 * markers.len());
     let mut at = 0;
-    for (o, (&marker, sight)) in equations.markers.iter().zip(equations.sights()).enumerate() {
+    for (&marker, sight) in equations.markers.iter().zip(equations.sights()) {
         at += usize::from(markers[at] != marker);
-        let (a, b) = (by_latents.column(2 * o), by_latents.column(2 * o + 1));
+        let of_pose = sight.row_range(equations.pose_rows());
         for (d, w) in sight.by_marker().row_iter().enumerate() {
             let mut column = coupling.column_mut(3 * at + d);
-            add_combination(column.as_mut_slice(), [a.as_slice(), b.as_slice()], [w[0], w[1]]);
+            add_combination(column.as_mut_slice(), of_pose, [w[0], w[1]]);
         }
     }
     (markers, coupling)

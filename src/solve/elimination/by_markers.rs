@@ -16,7 +16,7 @@ use super::marker_rows::{ImageRows, MarkerBlock, MarkerRows, times_right};
 use super::pose_space::PoseSpace;
 use super::right_hand_sides::RightHandSides;
 use super::seen_markers::SeenMarkers;
-use crate::linalg::{mirror_upper_rows, orthonormal, product};
+use crate::linalg::{mirror_upper_rows, orthonormal, upper_product};
 use crate::model::plate_modes::MODES;
 use crate::problem::Step;
 use crate::solve::linear::{Carried, LinearImage, LinearPose, LinearProblem, LinearStop};
@@ -220,14 +220,15 @@ impl MarkersEliminated {
         distances: &Distances,
         carried: Option<&Carried>,
     ) -> Vec<Vec<Option<Matrix3<f64>>>> {
-        let spread = self.space.spread(reduced);
+        let mut half = self.space.spread(reduced);
+        (0..half.nrows()).for_each(|row| half[(row, row)] *= 0.5);
         let with_distances = distances.with_markers(reduced, |r| self.space.times(r));
         let has_all_rows = self.held.ncols() > 0 || carried.is_some() || with_distances.is_some();
         let of_block = |block: &MarkerBlock| {
             let markers = block.markers.clone();
             let (mut d, of_rows) = match has_all_rows {
-                true => (self.all_rows(block), Cow::Borrowed(&spread)),
-                false => (block.values.clone(), Cow::Owned(block.part_of(&spread))),
+                true => (self.all_rows(block), Cow::Borrowed(&half)),
+                false => (block.values.clone(), Cow::Owned(block.upper_part_of(&half))),
             };
             times_right(&mut d, &self.inverse_factors[markers.clone()]);
             for (k, at) in markers.clone().enumerate() {
@@ -238,10 +239,12 @@ impl MarkersEliminated {
                     own -= modes.transpose();
                 }
             }
-            let cd = product(&of_rows, &d);
+            // Half of the symmetric one, which it and its transpose add up to.
+            let cd = upper_product(&of_rows, &d);
             let of = |(k, at): (usize, usize)| {
                 let d = d.columns(3 * k, 3);
-                let mut c = Matrix3::from_column_slice(d.tr_mul(&cd.columns(3 * k, 3)).as_slice());
+                let half = Matrix3::from_column_slice(d.tr_mul(&cd.columns(3 * k, 3)).as_slice());
+                let mut c = half + half.transpose();
                 let (f, held) = (self.inverse_factors[at], self.held.rows(3 * at, 3));
                 if let Some(with) = &with_distances {
                     c += with.of_marker(at, &d, &f);

@@ -1,23 +1,25 @@
 //! What is latent eliminated stop by stop: the dense columns and the markers stay.
 //!
 //! With the information `H = F F'` of what is latent at a stop (pixels of its images through `L`, and the priors) and its coupling `B` with
-//! what stays, `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product. Stops at which no image
-//! was taken need none of that ([`super::body_stops`]).
+//! what stays, `Y = B F^-T`: the reduced information is the information without the elimination less `sum Y Y'`, one Gram product. What is latent is
+//! coupled through the poses alone: with the coupling `C` of these, `B = C L`, and with `F^-1 L' = Q R` it is `Y = C R' Q'`. Where poses have fewer
+//! components than there are latents, `C R'` stands for `Y`. Stops at which no image was taken need none of that ([`super::body_stops`]).
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView, Matrix3, SMatrix};
 use rayon::prelude::*;
 
 use super::alike::alike;
-use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, latents_with_markers};
+use super::blocks::{DenseCoupling, PoseRows, STOPS_A_PRODUCT, pose_with_markers};
 use super::body_stops::{BodyStops, touched};
 use super::group::{Group, union};
 use super::right_hand_sides::RightHandSides;
 use super::seen_markers::SeenMarkers;
 use super::stop_covariance::StopCovariance;
-use crate::linalg::{gram, inverse_factor, mirror_upper, orthonormal, product};
+use crate::linalg::{gram, inverse_factor, mirror_upper, orthonormal, product, upper_product};
 use crate::model::plate_modes::MODES;
 use crate::problem::{Equations, Step};
 use crate::solve::linear::Carried;
@@ -34,17 +36,21 @@ struct Block {
     /// `F^-1`.
     inverse_factor: DMatrix<f64>,
     /// Unknowns that stay and that its images touch, ascending.
-    rows: Vec<usize>,
-    /// `Y`, `rows` x latent.
-    y: DMatrix<f64>,
+    rows: Arc<Vec<usize>>,
+    /// `Y Q`, `rows` x columns of `Q`.
+    y: Arc<DMatrix<f64>>,
+    /// `Q`, orthonormal, latent x at most as many; `None` for one.
+    basis: Option<DMatrix<f64>>,
     /// `F^-1` times the right-hand side.
     rhs: DVector<f64>,
 }
 
 /// How something moves, transposed: a column for each of its coordinates.
 struct Through {
-    /// By the unknowns that its stop touches.
+    /// By the unknowns that its stop touches, of as many combinations as move it.
     by_rows: DMatrix<f64>,
+    /// Combinations x its coordinates; `None` where they are these.
+    combined: Option<DMatrix<f64>>,
     /// By what is left of the latents of its stop, normalised.
     by_latents: DMatrix<f64>,
 }
@@ -93,11 +99,37 @@ impl StopsEliminated {
         let groups = alike(&blocks.iter().map(|block| linear.stop(block.at)).collect::<Vec<_>>());
         for places in &groups {
             let own = || places.iter().map(|&place: &usize| &blocks[place]);
-            let group = Group::of(own().map(|block| &block.rows));
-            group.subtract_gram(&mut a, &group.side_by_side(own().map(|block| (&block.rows, &block.y))));
+            let group = Group::of(own().map(|block| &*block.rows));
+            group.subtract_gram(&mut a, &group.side_by_side(own().map(|block| (&*block.rows, &*block.y))));
         }
         mirror_upper(&mut a);
         (a, Self { blocks, groups, bodies, seen, dense })
+    }
+
+    /// Several parts with stops of their own together, each with its stops by their places there; `place` is that of a stop among all. No part has
+    /// stops without images.
+    pub fn together<'a>(
+        parts: impl Iterator<Item = (&'a Self, &'a [usize])>,
+        place: impl Fn(usize) -> Option<usize>,
+    ) -> Option<Self> {
+        let (mut blocks, mut groups, mut first): (Vec<Block>, Vec<Vec<usize>>, _) = (Vec::new(), Vec::new(), None);
+        for (part, stops) in parts {
+            let at: Vec<usize> = part.blocks.iter().map(|block| place(stops[block.at])).collect::<Option<_>>()?;
+            groups.extend(part.groups.iter().map(|group| group.iter().map(|&own| at[own]).collect()));
+            blocks.extend(part.blocks.iter().zip(&at).map(|(block, &at)| Block { at, ..block.clone() }));
+            first.get_or_insert(part);
+        }
+        blocks.sort_unstable_by_key(|block| block.at);
+        let Self { bodies, seen, dense, .. } = first?.clone();
+        Some(Self { blocks, groups, bodies, seen, dense })
+    }
+
+    /// Takes the priors of the markers so many times out of an information.
+    pub fn take_priors(&self, linear: LinearProblem, times: usize, information: &mut DMatrix<f64>) {
+        for (at, &(plate, marker)) in self.seen.order.iter().enumerate() {
+            let taken = times as f64 * linear.adjustment.problem.marker_information(plate, marker);
+            (0..3).map(|d| self.dense + 3 * at + d).for_each(|row| information[(row, row)] -= taken);
+        }
     }
 
     /// Takes over the right-hand sides of the latents at a linearisation; returns the reduced one, without the priors of the dense columns.
@@ -109,7 +141,10 @@ impl StopsEliminated {
         reduced.rows_range_mut(dense..).copy_from(&self.seen.gradient(linear));
         for block in &mut self.blocks {
             block.rhs = &block.inverse_factor * linear.stop(block.at).gradient();
-            let taken = &block.y * &block.rhs;
+            let taken = match &block.basis {
+                Some(basis) => &*block.y * basis.tr_mul(&block.rhs),
+                None => &*block.y * &block.rhs,
+            };
             block.rows.iter().zip(taken.iter()).for_each(|(&row, value)| reduced[row] -= value);
         }
         reduced
@@ -139,9 +174,12 @@ impl StopsEliminated {
     pub fn carry(&mut self, (stop, first): (usize, usize), to: usize, by: &DMatrix<f64>) {
         let Some(block) = self.blocks.iter_mut().find(|block| block.at == stop) else { return };
         let Some(factor) = block.inverse_factor.clone().try_inverse() else { return };
+        if let Some(basis) = block.basis.take() {
+            block.y = Arc::new(product(&block.y, &basis.transpose()));
+        }
         let carried = by.tr_mul(&factor.rows(first, by.nrows()));
         for (at, row) in block.rows.iter().enumerate().filter(|(_, r)| (to..to + by.ncols()).contains(r)) {
-            let mut own = block.y.row_mut(at);
+            let mut own = Arc::make_mut(&mut block.y).row_mut(at);
             own += carried.row(row - to);
         }
     }
@@ -182,7 +220,9 @@ impl StopsEliminated {
         let mut step = self.of_what_stays(linear, x.column(0));
         for block in &self.blocks {
             let own = DVector::from_iterator(block.rows.len(), block.rows.iter().map(|&c| x[c]));
-            let dl = block.inverse_factor.tr_mul(&(&block.rhs - block.y.tr_mul(&own)));
+            let own = block.y.tr_mul(&own);
+            let taken = block.basis.as_ref().map_or_else(|| own.clone(), |basis| basis * &own);
+            let dl = block.inverse_factor.tr_mul(&(&block.rhs - taken));
             linear.stop(block.at).put(dl.as_slice(), &mut step);
         }
         self.bodies.put_step(linear, x, &mut step);
@@ -209,7 +249,7 @@ impl StopsEliminated {
             self.blocks.iter().map(|block| &block.inverse_factor * &of.stops[block.at]).collect();
         self.bodies.reduce(linear, of, &mut reduced);
         for (block, own) in self.blocks.iter().zip(&whitened) {
-            let taken = product(&block.y, own);
+            let taken = product(&block.y, &block.in_basis(own));
             for (&row, taken) in block.rows.iter().zip(taken.row_iter()) {
                 let mut row = reduced.row_mut(row);
                 row -= taken;
@@ -219,7 +259,7 @@ impl StopsEliminated {
         let mut steps: Vec<Step> = x.column_iter().map(|x| self.of_what_stays(linear, x)).collect();
         self.bodies.put_steps(linear, of, &x, &mut steps);
         for (block, own) in self.blocks.iter().zip(&whitened) {
-            let left = own - product(&block.y.transpose(), &x.select_rows(&block.rows));
+            let left = own - block.out_of_basis(product(&block.y.transpose(), &x.select_rows(block.rows.iter())));
             let (latents, stop) = (block.inverse_factor.tr_mul(&left), linear.stop(block.at));
             steps.iter_mut().zip(latents.column_iter()).for_each(|(step, own)| stop.put(own.as_slice(), step));
         }
@@ -238,16 +278,18 @@ impl StopsEliminated {
             let own = places.iter().map(|&place| &self.blocks[place]);
             let own = own.filter_map(|block| Some((block, moves(block, asked.get(&block.at)?))));
             let own: Vec<(&Block, Vec<Through>)> = own.collect();
-            let all = || own.iter().flat_map(|(block, of)| of.iter().map(|t| (&block.rows, &t.by_rows)));
+            let all = || own.iter().flat_map(|(block, of)| of.iter().map(|t| (&*block.rows, &t.by_rows)));
             let group = Group::of(all().map(|(rows, _)| rows));
             let d = group.side_by_side(all());
-            let of_reduced = product(&group.part_of(reduced), &d);
+            let of_reduced = upper_product(&group.half_of(reduced), &d);
             let mut end = 0;
-            let mut spread = |Through { by_rows, by_latents }: &Through| {
+            let mut spread = |Through { by_rows, combined, by_latents }: &Through| {
                 let columns = by_rows.ncols();
                 end += columns;
-                let by_rows = d.columns(end - columns, columns).tr_mul(&of_reduced.columns(end - columns, columns));
-                by_rows + by_latents.tr_mul(by_latents)
+                let half = d.columns(end - columns, columns).tr_mul(&of_reduced.columns(end - columns, columns));
+                let whole = &half + half.transpose();
+                let own = combined.as_ref().map_or_else(|| whole.clone(), |by| by.tr_mul(&(&whole * by)));
+                own + by_latents.tr_mul(by_latents)
             };
             let mut of_stop = |(block, of): &(&Block, Vec<Through>)| (block.at, of.iter().map(&mut spread).collect());
             own.iter().map(&mut of_stop).collect::<Vec<(usize, Vec<DMatrix<f64>>)>>()
@@ -258,8 +300,9 @@ impl StopsEliminated {
     /// Of different stops: of what is latent there, `H^-1 + H^-1 B' cov(x) B H^-1`, and of measured bodies.
     pub fn stop_covariances(&self, reduced: &DMatrix<f64>, stops: &[LinearStop]) -> Vec<StopCovariance> {
         let moves = |block: &Block, stop: &LinearStop| {
-            let Block { inverse_factor, y, .. } = block;
-            let latents = Through { by_rows: y * inverse_factor, by_latents: inverse_factor.clone() };
+            let Block { inverse_factor, y, basis, .. } = block;
+            let combined = Some(basis.as_ref().map_or_else(|| inverse_factor.clone(), |q| q.tr_mul(inverse_factor)));
+            let latents = Through { by_rows: (**y).clone(), combined, by_latents: inverse_factor.clone() };
             std::iter::once(latents).chain(stop.body_poses().map(|pose| block.through(&pose))).collect()
         };
         let of_images = self.covariances(reduced, stops, moves).into_iter();
@@ -299,31 +342,20 @@ impl StopsEliminated {
     }
 }
 
-/// One image or measured body with its coupling.
+/// One image or measured body, whose pose is coupled with what stays.
 struct Coupled {
-    /// Places of its latents at the stop.
-    latents: Vec<usize>,
     /// Unknowns that stay and that it touches, ascending.
     rows: Vec<usize>,
-    /// `latents` x `rows`.
+    /// 6 x `rows`.
     coupling: DMatrix<f64>,
-}
-
-/// `L' [H G]` of some columns, from the rows `H G` of a pose.
-fn with_latents(l: &DMatrix<f64>, of_pose: DMatrixView<f64>, rows: &[usize]) -> DMatrix<f64> {
-    let mut coupling = DMatrix::zeros(l.ncols(), rows.len());
-    for (mut into, &c) in coupling.column_iter_mut().zip(rows) {
-        into.gemv_tr(1.0, l, &of_pose.fixed_view::<6, 1>(0, c), 0.0);
-    }
-    coupling
 }
 
 impl Coupled {
     /// Of a measured body.
     fn of_body(body: &LinearPose, rows_of: &PoseRows) -> Self {
         let rows = touched(rows_of.layout(), std::iter::once(body.chain));
-        let coupling = with_latents(&body.chain.d_latent, rows_of.of(body.place), &rows);
-        Self { latents: body.latents.clone(), rows, coupling }
+        let coupling = rows_of.of(body.place).select_columns(&rows);
+        Self { rows, coupling }
     }
 
     /// With the coupling of its pose with the `dense` columns, and of the markers that were seen where they stay.
@@ -332,13 +364,12 @@ impl Coupled {
         of_pose: DMatrixView<f64>,
         (dense, seen, equations): (usize, &SeenMarkers, Option<&Equations>),
     ) -> Self {
-        let l = &image.chain.d_latent;
         // Columns that stay at their value take no part, nor in the back-substitution.
         let mut rows = image.free_columns();
-        let mut coupling = with_latents(l, of_pose, &rows);
+        let mut coupling = of_pose.select_columns(&rows);
         if let Some(equations) = equations {
             let number = &seen.number[image.image.plate];
-            let (markers, with_markers) = latents_with_markers(l, equations);
+            let (markers, with_markers) = pose_with_markers(equations);
             let first = rows.len();
             let numbered = markers.iter().enumerate().filter_map(|(k, &m)| Some((number[m]?, k)));
             let numbered: BTreeMap<usize, usize> = numbered.collect();
@@ -348,21 +379,34 @@ impl Coupled {
                 coupling.fixed_columns_mut::<3>(into).copy_from(&with_markers.fixed_columns::<3>(3 * k));
             }
         }
-        Self { latents: image.latents().into_iter().flatten().collect(), rows, coupling }
+        Self { rows, coupling }
     }
 }
 
 impl Block {
+    /// `Q'` times what has a row for everything latent.
+    fn in_basis<'a>(&self, latents: &'a DMatrix<f64>) -> Cow<'a, DMatrix<f64>> {
+        self.basis.as_ref().map_or(Cow::Borrowed(latents), |basis| Cow::Owned(basis.tr_mul(latents)))
+    }
+
+    /// `Q` times what has a row for every column of `Q`.
+    fn out_of_basis(&self, own: DMatrix<f64>) -> DMatrix<f64> {
+        match &self.basis {
+            Some(basis) => basis * own,
+            None => own,
+        }
+    }
+
     /// Of a pose at its stop, through `G - L D'` and `L F^-T`.
     fn through(&self, pose: &LinearPose) -> Through {
         let Self { inverse_factor, rows, y, .. } = self;
         let theta = pose.chain.d_theta.ncols();
         let by_latents = inverse_factor * pose.by_latents(inverse_factor.ncols()).transpose();
-        let mut by_rows = -y * &by_latents;
-        for (mut row, &c) in by_rows.row_iter_mut().zip(rows).filter(|(_, c)| **c < theta) {
+        let mut by_rows = -(&**y * self.in_basis(&by_latents).as_ref());
+        for (mut row, &c) in by_rows.row_iter_mut().zip(&**rows).filter(|(_, c)| **c < theta) {
             row += pose.chain.d_theta.column(c).transpose();
         }
-        Through { by_rows, by_latents }
+        Through { by_rows, combined: None, by_latents }
     }
 
     /// Of a stop with the equations of its images, where markers are among those `seen`; `dense` is the first unknown of the markers.
@@ -383,21 +427,30 @@ impl Block {
         (Self::new(stop, &own, lambda), all)
     }
 
-    fn new(stop: &LinearStop, images: &[Coupled], lambda: f64) -> Self {
+    fn new(stop: &LinearStop, poses: &[Coupled], lambda: f64) -> Self {
         let n = stop.unknowns();
         let mut h = stop.information();
         (0..n).for_each(|s| h[(s, s)] *= 1.0 + lambda);
         let inverse_factor = inverse_factor(h).unwrap_or_else(|| DMatrix::zeros(n, n));
-        let rows = union(images.iter().map(|own| &own.rows));
-        let mut coupling = DMatrix::zeros(rows.len(), n);
-        for Coupled { latents, rows: touched, coupling: own } in images {
+        let rows = union(poses.iter().map(|own| &own.rows));
+        let (mut coupling, mut l) = (DMatrix::zeros(rows.len(), 6 * poses.len()), DMatrix::zeros(6 * poses.len(), n));
+        for (k, (Coupled { rows: touched, coupling: own }, pose)) in poses.iter().zip(stop.poses()).enumerate() {
+            l.rows_mut(6 * k, 6).copy_from(&pose.by_latents(n));
             let mut at = 0;
             for (row, own) in touched.iter().zip(own.column_iter()) {
                 at += rows[at..].partition_point(|r| r < row);
-                latents.iter().zip(own.iter()).for_each(|(&latent, value)| coupling[(at, latent)] += value);
+                coupling.fixed_view_mut::<1, 6>(at, 6 * k).copy_from(&own.fixed_rows::<6>(0).transpose());
             }
         }
-        let y = product(&coupling, &inverse_factor.transpose());
-        Self { at: stop.at, inverse_factor, rows, y, rhs: DVector::zeros(n) }
+        let normalised = &inverse_factor * l.transpose();
+        let (y, basis) = match normalised.ncols() < n {
+            true => {
+                let qr = normalised.qr();
+                (product(&coupling, &qr.r().transpose()), Some(qr.q()))
+            }
+            false => (product(&coupling, &normalised.transpose()), None),
+        };
+        let (rows, y) = (Arc::new(rows), Arc::new(y));
+        Self { at: stop.at, inverse_factor, rows, y, basis, rhs: DVector::zeros(n) }
     }
 }

@@ -231,15 +231,16 @@ impl MarkerBlock {
         own
     }
 
-    /// The part of a matrix over all unknowns that belongs to its rows.
-    pub fn part_of(&self, all: &DMatrix<f64>) -> DMatrix<f64> {
+    /// The upper triangle of the part of a matrix over all unknowns that belongs to its rows.
+    pub fn upper_part_of(&self, all: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.values.nrows();
         let mut own = DMatrix::zeros(n, n);
-        for columns in &self.runs {
-            let of = all.columns(columns.into, columns.length);
-            for Run { from, into, length } in &self.runs {
-                let mut part = own.view_mut((*from, columns.from), (*length, columns.length));
-                part.copy_from(&of.rows(*into, *length));
+        let columns = self.runs.iter().flat_map(|run| run.into..run.into + run.length);
+        for (j, (mut part, column)) in own.column_iter_mut().zip(columns).enumerate() {
+            let of = all.column(column);
+            for Run { from, into, length } in self.runs.iter().take_while(|run| run.from <= j) {
+                let length = (*length).min(j + 1 - from);
+                part.rows_mut(*from, length).copy_from(&of.rows(*into, length));
             }
         }
         own

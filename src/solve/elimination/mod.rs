@@ -5,6 +5,7 @@
 //!     -> marker_rows, blocks, right_hand_sides, distances (blocks of the normal equations)
 //!     -> by_markers, or by_stops with body_stops (one family eliminated)
 //!     -> system (the reduced equations, their solution, what follows at every stop)
+//!     -> parts (systems of all but some of the stops)
 //! ```
 
 mod alike;
@@ -15,6 +16,7 @@ mod by_stops;
 mod distances;
 mod group;
 mod marker_rows;
+pub(super) mod parts;
 mod pose_space;
 pub(super) mod right_hand_sides;
 mod runs;

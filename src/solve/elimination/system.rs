@@ -33,6 +33,13 @@ impl Elimination {
         let markers: usize = linear.adjustment.problem.plates.iter().map(|p| 3 * p.markers.len()).sum();
         if latent > markers { Self::Stops } else { Self::Markers }
     }
+
+    /// That of steps: where every marker is held, none moves.
+    pub fn of_steps(linear: LinearProblem) -> Self {
+        let plates = &linear.adjustment.problem.plates;
+        let are_held = plates.iter().flat_map(|p| &p.markers).all(|m| m.sigma_m == 0.0);
+        if are_held { Self::StopsMarkersHeld } else { Self::cheaper(linear) }
+    }
 }
 
 /// What is needed to get the eliminated family back.
@@ -99,6 +106,20 @@ impl System {
                 (a, Eliminated::Stops(rest))
             }
         };
+        Self::completed(linear, lambda, information, eliminated)
+    }
+
+    /// Of an information without the priors of the dense columns, what is latent eliminated stop by stop.
+    pub(super) fn by_stops(linear: LinearProblem, information: DMatrix<f64>, rest: StopsEliminated) -> Self {
+        let mut system = Self::completed(linear, 0.0, information, Eliminated::Stops(rest));
+        system.add_distances(linear, None);
+        system.take_gradient(linear);
+        system
+    }
+
+    /// With the priors of the dense columns, those damped by `lambda` and those fixed held.
+    fn completed(linear: LinearProblem, lambda: f64, information: DMatrix<f64>, eliminated: Eliminated) -> Self {
+        let problem = &linear.adjustment.problem;
         let latent_start = if let Eliminated::Markers(e) = &eliminated { e.latent_start.clone() } else { Vec::new() };
         let rhs = DVector::zeros(information.nrows());
         let distances = Distances::none();
