@@ -64,7 +64,7 @@ pub struct MeasuredSeries {
     pub known_camera: Option<KnownCamera>,
     /// Lens model.
     pub lens: Lens,
-    /// Whether the evidence decides on the lens; the fit then begins with the simplest.
+    /// Whether the evidence decides on the lens; the fit then begins with the simplest that explains the images.
     pub lens_choice: LensChoice,
     /// What an observation of a circle means: true for the centroid of its image, false for its imaged centre.
     pub centroid: bool,

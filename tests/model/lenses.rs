@@ -110,6 +110,17 @@ fn other_lenses_are_asked_where_the_residuals_show_a_pattern() {
     assert!(asked(Lens::Parallax) > 4);
 }
 
+/// The simplest lens does not explain the images of a wide angle: the fit does not begin with it.
+#[test]
+fn a_wide_angle_begins_with_the_lens_that_explains_it() {
+    let s = found(&world(Lens::Fisheye, 120.0), Lens::Brown, LensChoice::All);
+    println!("{:?}", s.lenses);
+    assert_eq!(s.fit.state.cameras[0].lens, Lens::Fisheye);
+    assert!(s.lenses.iter().all(|l| l.lens.formula() == Lens::Fisheye), "no pattern asks for another");
+    let first = found(&world(Lens::Rational, 75.0), Lens::Brown, LensChoice::All);
+    assert!(first.lenses.iter().any(|l| l.lens == Lens::Brown));
+}
+
 #[test]
 fn a_camera_without_a_field_has_no_family_of_one() {
     let s = found(&world(Lens::Brown, 60.0), Lens::BrownField, LensChoice::Settled);

@@ -143,6 +143,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/run.rs RETELLINGS", "most iterations"),
     ("identify/model_choice/evidence.rs ROUNDS", "most iterations"),
     ("identify/photogrammetry/free_poses.rs ENOUGH", "observations of the quick problem"),
+    ("identify/photogrammetry/free_poses.rs ENOUGH_IMAGES", "images of the quick problem"),
     ("identify/photogrammetry/free_poses.rs GOOD_START_PX", "saves starts; the best one counts"),
     ("identify/photogrammetry/free_poses.rs ROUNDS", "most iterations"),
     ("identify/photogrammetry/free_poses.rs START_DECREMENT", "convergence"),

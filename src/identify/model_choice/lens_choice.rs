@@ -8,7 +8,7 @@ use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{FreePoses, NoEvidence, fit_of_outcome, log_evidence_of_fit, log_evidence_of_outcome};
 use crate::identify::joint_fit::fit::{JointFit, fit_model};
 use crate::identify::options::Options;
-use crate::identify::photogrammetry::free_poses::free_poses_of;
+use crate::identify::photogrammetry::free_poses::{free_poses_of, good_start};
 use crate::identify::problem::build::build;
 use crate::identify::solution::LensEvidence;
 use crate::model::camera::{Camera, Lens, fit_lens};
@@ -52,6 +52,9 @@ pub(in crate::identify) fn with_lenses(chain: &Chain, series: &[MeasuredSeries],
     let mut series = series.to_vec();
     let open = if options.selection.names_cameras() { BTreeMap::new() } else { open_cameras(&series) };
     series.iter_mut().filter(|s| open.contains_key(&s.camera)).for_each(|s| s.lens = Lens::ALL[0]);
+    for camera in open.iter().filter(|(_, choice)| choice.has(Lens::Fisheye)).map(|(camera, _)| camera) {
+        begin_as_seen(chain, &mut series, camera, &options.limits);
+    }
     let (fit, mut notices) = match fit_model(chain.clone(), &series, options, None) {
         Ok(fit) => (fit, Vec::new()),
         Err(error) => by_hold_out(chain, &mut series, &open, options).ok_or(error)?,
@@ -78,6 +81,22 @@ pub(in crate::identify) fn with_lenses(chain: &Chain, series: &[MeasuredSeries],
         Ok(fit) => Lensed { fit, series: better_series, ..first },
         Err(error) => first.kept(&error),
     })
+}
+
+/// The fisheye for a camera of a wide angle whose images it explains and the simplest lens does not: that one is a long way to a bad end.
+fn begin_as_seen(chain: &Chain, series: &mut [MeasuredSeries], camera: &str, limits: &Limits) {
+    let robot = Robot::nominal(chain.clone());
+    let start = |series: &[MeasuredSeries]| good_start(&robot, series, camera, limits).unwrap_or_default();
+    if start(series).is_some() {
+        return;
+    }
+    let set = |series: &mut [MeasuredSeries], lens: Lens| {
+        series.iter_mut().filter(|s| s.camera == camera).for_each(|s| s.lens = lens);
+    };
+    set(series, Lens::Fisheye);
+    if start(series).is_none_or(|camera| camera.corner() <= limits.fisheye_tangent) {
+        set(series, Lens::ALL[0]);
+    }
 }
 
 impl Lensed {

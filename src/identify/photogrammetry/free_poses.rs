@@ -1,5 +1,7 @@
 //! Free-pose adjustment: cameras, plate and one free camera pose an image; the robot takes no part.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, Matrix6, Vector2};
 
 use super::camera_start::{CameraStart, camera_starts};
@@ -17,6 +19,7 @@ use crate::problem::{
     Adjustment, Family, Image, ImageRejection, Layout, Mark, MarkerObservation, MeasuredSeries, ObservationRejection,
     Problem, State, Tie, Weighting, size_by_distance,
 };
+use crate::series::spread;
 use crate::solve::{
     ComponentOptions, Elimination, Fit, LinearImage, Linearised, PlateScale, Settings, Similarity, Status,
     estimate_components_judged, frames, in_frame, in_frame_by, reject_contradictory, reject_observations, solve,
@@ -25,6 +28,9 @@ use crate::stage::stage;
 
 /// RMS of a start, px per point, from which no further focal length is tried.
 const GOOD_START_PX: f64 = 2.0;
+
+/// Images that are enough to tell a lens that is none of a camera.
+const ENOUGH_IMAGES: usize = 24;
 
 /// Newton decrement at which a start is left to the adjustment, in roots of the cost that it began with.
 const START_DECREMENT: f64 = 0.01;
@@ -127,6 +133,38 @@ pub(in crate::identify) fn free_poses_of(
     prepare(&mut start)?;
     let stated = camera_starts(&start.problem.cameras, series);
     adjust_free_poses(start, &stated, limits)
+}
+
+/// Start of a camera whose lens explains some of its images, to where no further focal length is tried; `None` where it does not.
+///
+/// # Errors
+/// Those of [`build`]; no image shows the plate, or no start leads to camera poses.
+pub(in crate::identify) fn good_start(
+    robot: &Robot,
+    series: &[MeasuredSeries],
+    camera: &str,
+    limits: &Limits,
+) -> Result<Option<Camera>> {
+    let mut adjustment = build(robot, series, false, limits)?;
+    adjustment.problem.take_bodies();
+    adjustment.hold_poses();
+    let Problem { cameras, images, .. } = &mut adjustment.problem;
+    let Some(k) = cameras.iter().position(|c| c == camera) else { return Ok(None) };
+    let stated = camera_starts(cameras, series);
+    let own = images.iter().filter(|image| image.camera == k && image.rejected.is_none()).count();
+    let enough: BTreeSet<usize> = spread(own, ENOUGH_IMAGES).collect();
+    let all = images.iter_mut().filter(|image| image.rejected.is_none());
+    let (of_camera, others): (Vec<_>, Vec<_>) = all.partition(|image| image.camera == k);
+    let rest = of_camera.into_iter().enumerate().filter(|(at, _)| !enough.contains(at)).map(|(_, image)| image);
+    rest.chain(others).for_each(|image| image.rejected = Some(ImageRejection::Excluded));
+    let homographies = fit_homographies(&mut adjustment)?;
+    let mut verdicts = Vec::new();
+    let mut state = start_camera(&adjustment, k, &homographies, &stated[k], &mut verdicts)?;
+    let is_good = |reached: &StartReached| match reached {
+        StartReached::CameraPoses { rms_px } => rms_px.is_some_and(|rms| rms < GOOD_START_PX),
+        _ => false,
+    };
+    Ok(verdicts.iter().any(|verdict| is_good(&verdict.reached)).then(|| state.cameras.swap_remove(k)))
 }
 
 /// Adjusts from nothing. The adjustment that is left holds rejections and pixel factors, cameras, plates and poses.
