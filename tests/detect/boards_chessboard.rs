@@ -1,6 +1,6 @@
 //! Chessboard corners on rendered boards with known truth.
 
-use crate::boards_scene::{Scene, View, errors, mirror, rms};
+use crate::boards_scene::{Scene, View, errors, mirror, rms, tiles};
 use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::detect::{Detection, FlatField, Picture, detect, detect_series};
@@ -77,6 +77,25 @@ fn corners_in_the_middle_of_a_pixel_of_a_drawing_are_found() {
         let [x, y] = [first[0] + c * side - o.uv[0], first[1] + r * side - o.uv[1]];
         // Two of the 0.015 px per axis that are stated beyond noise: edges without a lens are no Gaussian.
         assert!(x.hypot(y) < 0.042, "{}: {x} {y}", o.marker);
+    }
+}
+
+/// Floors with more crossings than the board, turned otherwise than it: none of its corners was found.
+#[test]
+fn a_floor_of_tiles_hides_no_board() {
+    let floors = [[12.0, 15.0], [18.0, 18.0], [26.0, 33.0], [60.0, 60.0]];
+    for (k, sides) in floors.into_iter().enumerate() {
+        for turn in [0.3, 0.8, 1.2] {
+            let scene = tilted(9, 6, 1.7 * k as f64);
+            let picture = scene.on_ground(scene.render(0), 0.8, tiles(sides, 1.7 * k as f64 + turn, [60.0, 150.0]));
+            let detection = detect(&picture, &plate(9, 6)).unwrap_or_else(|error| panic!("{sides:?} {turn}: {error}"));
+            assert_eq!(detection.observations.len(), 54, "{sides:?} {turn}");
+            let error = rms(&errors(&detection, |id| scene.corner(id)));
+            assert!(error < 0.004, "{sides:?} {turn}: {error}");
+            // Tiles without a board are no board.
+            let floor = scene.on_ground(scene.render(0), -10.0, tiles(sides, turn, [60.0, 150.0]));
+            assert!(detect(&floor, &plate(9, 6)).is_err(), "{sides:?} {turn}");
+        }
     }
 }
 
