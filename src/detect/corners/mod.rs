@@ -53,6 +53,10 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
         view = view.smoothed(lattice);
         first = First::of(&view, lattice, placement);
     }
+    let measured = first.on(lattice);
+    if view.bend(&measured) {
+        first = First::of(&view, &measured, placement);
+    }
     let First { fitted, retry, mut detection, .. } = first;
     let usual = Usual::of(picture, &fitted);
     let mut kept = BTreeMap::new();
@@ -104,6 +108,12 @@ struct First {
 }
 
 impl First {
+    /// The lattice with the corners where they were measured.
+    fn on(&self, lattice: &Lattice) -> Lattice {
+        let at = |(key, uv): (&(i32, i32), &[f64; 2])| (*key, self.fitted.get(key).map_or(*uv, |saddle| saddle.uv));
+        lattice.iter().map(at).collect()
+    }
+
     fn of(view: &Sight, lattice: &Lattice, placement: Placement) -> Self {
         let mut first = Self::default();
         for (&key, &uv) in lattice {
