@@ -151,6 +151,20 @@ fn corners_of_one_bit_are_as_uncertain_as_their_rounding() {
     assert!(sum / f64::from(count) < 1.0, "{sum} over {count}");
 }
 
+/// A threshold below the middle joins light squares over the crossings, where all is then white: that is no over-exposure.
+#[test]
+fn a_threshold_between_dark_and_light_costs_no_corner() {
+    for threshold in [70.0, 110.0, 150.0] {
+        let scene = tilted(9, 6, 0.9);
+        let mut picture = scene.render(0);
+        picture.pixels.iter_mut().for_each(|v| *v = if *v < threshold { 0.0 } else { 255.0 });
+        let detection = detect(&picture, &plate(9, 6)).unwrap_or_else(|error| panic!("{threshold}: {error}"));
+        assert_eq!(detection.observations.len(), 54, "{threshold}: {:?}", detection.dropped);
+        let error = rms(&errors(&detection, |id| scene.corner(id)));
+        assert!(error < 0.2, "{threshold}: {error}");
+    }
+}
+
 /// Levels so few are no measure of the light, of which dark and white images tell.
 #[test]
 fn dark_and_white_images_that_are_not_applied_are_told_of() {
