@@ -2,8 +2,8 @@
 
 use super::Picture;
 use super::boards::charuco_seen::agreed;
-use super::boards::chessboard::find_lattice;
 use super::boards::labels::{Shader, parity};
+use super::boards::lattices::find_lattice;
 use super::boards::seen::{BoardSeen, SQUARES, trimmed};
 use super::corners::lattice::BoardSize;
 use super::tags::code::Reader;

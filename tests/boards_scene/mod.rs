@@ -212,6 +212,36 @@ impl Scene {
     }
 }
 
+impl Scene {
+    /// The picture with another ground than paper beyond a margin around the squares, in squares: `ground` says its counts at a pixel.
+    pub fn on_ground(&self, picture: Picture, margin: f64, ground: impl Fn([f64; 2]) -> f64) -> Picture {
+        let inverse = self.view.inverse();
+        let [right, below] = [self.columns, self.rows].map(|n| f64::from(n) + margin);
+        let mut picture = picture;
+        for (k, value) in picture.pixels.iter_mut().enumerate() {
+            let at = [(k % picture.width) as f64, (k / picture.width) as f64];
+            let [x, y] = project(&inverse, at);
+            if x < -1.0 - margin || y < -1.0 - margin || x > right || y > below {
+                *value = ground(at).round() as f32;
+            }
+        }
+        picture
+    }
+}
+
+/// Counts of a floor of dark and light tiles with these sides (px along and across), turned by `angle`: the mean of nine places of a pixel.
+pub fn tiles(sides: [f64; 2], angle: f64, [dark, light]: [f64; 2]) -> impl Fn([f64; 2]) -> f64 {
+    let (sin, cos) = angle.sin_cos();
+    move |[u, v]: [f64; 2]| {
+        let is_dark = |k: u32| {
+            let (x, y) = (u + f64::from(k % 3) / 3.0 - 1.0 / 3.0, v + f64::from(k / 3) / 3.0 - 1.0 / 3.0);
+            let tile = ((x * cos + y * sin) / sides[0]).floor() + ((y * cos - x * sin) / sides[1]).floor();
+            tile.rem_euclid(2.0) < 1.0
+        };
+        (0..9).map(|k| if is_dark(k) { dark } else { light }).sum::<f64>() / 9.0
+    }
+}
+
 /// Separable Gaussian over the fine picture with its margin; returns the pixels without it.
 fn blur(sharp: &[f32], w: usize, h: usize, sigma: f64, margin: usize) -> Vec<f32> {
     let kernel: Vec<f32> =

@@ -438,6 +438,22 @@ fn corners_of_a_charuco_board_are_found_through_a_fisheye() {
     assert!(tally.wrong == 0 && tally.share() > 0.95, "{tally:?}");
 }
 
+/// Edges of squares were taken for straight over the window of a corner, which moved corners by up to 0.1 px, far beyond what was stated.
+#[test]
+fn edges_that_a_fisheye_bends_move_no_corner() {
+    for kind in ["chessboard", "charuco"] {
+        let tally = views(kind, "fisheye", &[300000, 300001, 300002, 300003]);
+        assert!(tally.wrong == 0 && tally.found > 100 && tally.far == 0, "{kind}: {tally:?}");
+    }
+}
+
+/// The outermost dots were out of place for a map of the plane that went on from those within.
+#[test]
+fn outer_dots_of_a_grid_are_found_through_a_fisheye() {
+    let tally = views("circle-grid", "fisheye", &[300000, 300001, 300002, 300003]);
+    assert!(tally.wrong == 0 && tally.share() > 0.95, "{tally:?}");
+}
+
 #[test]
 fn no_board_gets_a_wrong_id() {
     for (kind, text) in BOARDS {

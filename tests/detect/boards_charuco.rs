@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::boards_scene::{Print, Scene, View, errors, mirror, rms};
+use crate::boards_scene::{Print, Scene, View, errors, mirror, rms, tiles};
 use crate::said::assert_says;
 use calib_targets_aruco::Dictionary;
 use calib_targets_aruco::builtins::{
@@ -43,6 +43,19 @@ fn charuco_corners_are_identified_in_every_orientation() {
         assert!(detection.notices.is_empty());
         let error = rms(&errors(&detection, |id| scene.corner(id)));
         assert!(error < 0.006, "step {step}: {error}");
+    }
+}
+
+/// Floors with more crossings than the board, turned otherwise than it.
+#[test]
+fn a_floor_of_tiles_hides_no_charuco_board() {
+    for (sides, turn) in [([18.0, 18.0], 0.3), ([26.0, 33.0], 0.8), ([60.0, 60.0], 1.2)] {
+        let scene = charuco_scene(0.4);
+        let picture = scene.on_ground(scene.render(0), 0.4, tiles(sides, 0.4 + turn, [60.0, 150.0]));
+        let detection = detect(&picture, &charuco_plate(Some(("DICT_4X4_50", 0.7)))).unwrap();
+        assert_eq!(detection.observations.len(), 40, "{sides:?} {turn}");
+        let error = rms(&errors(&detection, |id| scene.corner(id)));
+        assert!(error < 0.006, "{sides:?} {turn}: {error}");
     }
 }
 

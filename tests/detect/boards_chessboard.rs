@@ -1,6 +1,6 @@
 //! Chessboard corners on rendered boards with known truth.
 
-use crate::boards_scene::{Scene, View, errors, mirror, rms};
+use crate::boards_scene::{Scene, View, errors, mirror, rms, tiles};
 use crate::said::assert_says;
 use robotcal::Code;
 use robotcal::detect::{Detection, FlatField, Picture, detect, detect_series};
@@ -80,6 +80,25 @@ fn corners_in_the_middle_of_a_pixel_of_a_drawing_are_found() {
     }
 }
 
+/// Floors with more crossings than the board, turned otherwise than it: none of its corners was found.
+#[test]
+fn a_floor_of_tiles_hides_no_board() {
+    let floors = [[12.0, 15.0], [18.0, 18.0], [26.0, 33.0], [60.0, 60.0]];
+    for (k, sides) in floors.into_iter().enumerate() {
+        for turn in [0.3, 0.8, 1.2] {
+            let scene = tilted(9, 6, 1.7 * k as f64);
+            let picture = scene.on_ground(scene.render(0), 0.8, tiles(sides, 1.7 * k as f64 + turn, [60.0, 150.0]));
+            let detection = detect(&picture, &plate(9, 6)).unwrap_or_else(|error| panic!("{sides:?} {turn}: {error}"));
+            assert_eq!(detection.observations.len(), 54, "{sides:?} {turn}");
+            let error = rms(&errors(&detection, |id| scene.corner(id)));
+            assert!(error < 0.004, "{sides:?} {turn}: {error}");
+            // Tiles without a board are no board.
+            let floor = scene.on_ground(scene.render(0), -10.0, tiles(sides, turn, [60.0, 150.0]));
+            assert!(detect(&floor, &plate(9, 6)).is_err(), "{sides:?} {turn}");
+        }
+    }
+}
+
 #[test]
 fn uneven_light_does_not_move_corners() {
     let even = tilted(9, 6, 0.3);
@@ -130,6 +149,20 @@ fn corners_of_one_bit_are_as_uncertain_as_their_rounding() {
         }
     }
     assert!(sum / f64::from(count) < 1.0, "{sum} over {count}");
+}
+
+/// A threshold below the middle joins light squares over the crossings, where all is then white: that is no over-exposure.
+#[test]
+fn a_threshold_between_dark_and_light_costs_no_corner() {
+    for threshold in [70.0, 110.0, 150.0] {
+        let scene = tilted(9, 6, 0.9);
+        let mut picture = scene.render(0);
+        picture.pixels.iter_mut().for_each(|v| *v = if *v < threshold { 0.0 } else { 255.0 });
+        let detection = detect(&picture, &plate(9, 6)).unwrap_or_else(|error| panic!("{threshold}: {error}"));
+        assert_eq!(detection.observations.len(), 54, "{threshold}: {:?}", detection.dropped);
+        let error = rms(&errors(&detection, |id| scene.corner(id)));
+        assert!(error < 0.2, "{threshold}: {error}");
+    }
 }
 
 /// Levels so few are no measure of the light, of which dark and white images tell.

@@ -10,6 +10,7 @@ use super::charuco_numbers::{Contradiction, Counting, contradiction};
 use super::charuco_seen::{Seen, elsewhere, ids, instead, side_seen};
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
+use super::lattices::left_over;
 use super::sizes::{best_of_sizes, on_picture};
 use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 use crate::detect::corners::{Window, measure};
@@ -149,11 +150,28 @@ impl Found {
 /// The print that explains most markers in the picture at another size, with what was found.
 fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least: usize) -> Result<Option<Found>> {
     let scaled = bytes.scaled(scale);
-    let corners = find_corners(&scaled);
+    let mut corners = find_corners(&scaled);
+    loop {
+        if let Some(found) = among(&corners, (&scaled, scale), prints, board, least)? {
+            return Ok(Some(found));
+        }
+        let Some(left) = left_over(&corners) else { return Ok(None) };
+        corners = left;
+    }
+}
+
+/// The same, of some of the corners.
+fn among(
+    corners: &[ChessCorner],
+    (scaled, scale): (&Bytes, f64),
+    prints: &[Print],
+    board: BoardSize,
+    least: usize,
+) -> Result<Option<Found>> {
     let mut best: Option<Found> = None;
     let mut all: Vec<(bool, (usize, usize))> = Vec::new();
     for print in prints {
-        let Some(found) = decode(&scaled.view(), &corners, print, board)? else { continue };
+        let Some(found) = decode(&scaled.view(), corners, print, board)? else { continue };
         let markers = found.markers.len();
         if markers < least {
             continue;
@@ -171,7 +189,7 @@ fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least
     if let Some(best) = &mut best {
         let rivals = all.iter().filter(|(legacy, _)| *legacy != best.print.legacy);
         best.rival = rivals.map(|(_, explains)| *explains).max();
-        let others = beside(&corners, &best.lattice, scale, board);
+        let others = beside(corners, &best.lattice, scale, board);
         if 2 * others.len() >= best.lattice.len() {
             let twin = decode(&scaled.view(), &others, &best.print, board)?;
             best.has_twin = twin.is_some_and(|twin| have_place(&twin.markers));

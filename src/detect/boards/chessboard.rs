@@ -3,18 +3,14 @@
 //! The lattice of corners comes from the `calib-targets` library; which corner is which, the sub-pixel position in the
 //! full depth of the picture and its covariance are found here.
 
-use std::cell::{LazyCell, OnceCell};
+use std::cell::LazyCell;
 
-use calib_targets_chessboard::{ChessboardCorner, ChessboardDetection, ChessboardDetector, ChessboardParams};
-
-use super::corner_finder::find_corners;
 use super::ends::Ends;
 use super::labels::{Labelling, label};
+use super::lattices::Lattices;
 use super::seen::BoardSeen;
-use super::sizes::on_picture;
 use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 use crate::detect::corners::{Window, measure};
-use crate::detect::pictures::bytes::Bytes;
 use crate::detect::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::series::Plate;
@@ -22,9 +18,6 @@ use crate::series::Plate;
 /// Pixels for one corner: as far along the edges as the next corners do not disturb, and near enough that the lens
 /// does not bend the edges.
 pub(super) const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0, arm: 1.0, dot: 0.0, keep_off_px: 0.0 };
-
-/// Pictures with more pixels are looked at in half their size first.
-const LARGE_PX: usize = 500_000;
 
 /// Finds the inner corners of a chessboard; parts of the board may be out of view or covered.
 ///
@@ -46,11 +39,11 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     }
 }
 
-/// The stated board from end to end beside a larger one.
+/// The stated board from end to end beside a larger one, or before a floor of tiles.
 fn beside(picture: &Picture, seen: &Lattices, board: BoardSize) -> Option<Detection> {
     seen.smaller().find_map(|lattice| {
-        BoardSeen::of(picture, lattice).filter(|seen| seen.is(board))?;
-        let found = on_lattice(picture, lattice, board).ok()?;
+        BoardSeen::of(picture, &lattice).filter(|seen| seen.is(board))?;
+        let found = on_lattice(picture, &lattice, board).ok()?;
         let is_whole = found.failure.is_none() && found.outline == Outline::Whole;
         is_whole.then_some(Detection { outline: Outline::Beside, ..found })
     })
@@ -104,62 +97,6 @@ pub(super) fn board_size(plate: &Plate) -> Result<BoardSize> {
             "set `columns` and `rows` of the plate file to the numbers of inner corners, each from 2 to 1000",
         )),
     }
-}
-
-/// The largest regular lattice of saddle points in a picture, see [`Lattices::largest`].
-pub(in crate::detect) fn find_lattice(picture: &Picture, board: BoardSize) -> Option<Lattice> {
-    Lattices::of(picture).largest(board).cloned()
-}
-
-/// The regular lattices of saddle points of a picture: sought once at every size, when they are asked for.
-struct Lattices {
-    bytes: Bytes,
-    by_scale: [(f64, OnceCell<Vec<Lattice>>); 2],
-}
-
-impl Lattices {
-    fn of(picture: &Picture) -> Self {
-        Self { bytes: Bytes::of(picture), by_scale: scales(picture).map(|scale| (scale, OnceCell::new())) }
-    }
-
-    /// Of one size of the picture after the other.
-    fn by_scale(&self) -> impl Iterator<Item = &[Lattice]> {
-        self.by_scale.iter().map(|(scale, found)| found.get_or_init(|| lattices(&self.bytes, *scale)).as_slice())
-    }
-
-    /// The largest: sought in the picture at one size, and at the next unless that shows as many corners as the board has. Large pictures
-    /// begin with half their size, where there are fewer pixels and a sharpened edge is one step; in small ones squares may be too small for
-    /// the finder.
-    fn largest(&self, board: BoardSize) -> Option<&Lattice> {
-        let mut best: Option<&Lattice> = None;
-        for lattice in self.by_scale().filter_map(<[Lattice]>::first) {
-            if best.is_none_or(|other| lattice.len() >= other.len()) {
-                best = Some(lattice);
-            }
-            if best.is_some_and(|found| found.len() >= (board.columns * board.rows) as usize) {
-                break;
-            }
-        }
-        best
-    }
-
-    /// Those beside the largest of either size.
-    fn smaller(&self) -> impl Iterator<Item = &Lattice> {
-        self.by_scale().flat_map(|found| found.iter().skip(1))
-    }
-}
-
-/// Sizes of the picture at which lattices are sought, one after the other.
-fn scales(picture: &Picture) -> [f64; 2] {
-    if picture.width * picture.height > LARGE_PX { [0.5, 1.0] } else { [1.0, 2.0] }
-}
-
-/// The regular lattices at another size of the picture, the largest first, in px of the picture.
-fn lattices(bytes: &Bytes, scale: f64) -> Vec<Lattice> {
-    let Ok(detector) = ChessboardDetector::new(ChessboardParams::default()) else { return Vec::new() };
-    let at = |c: &ChessboardCorner| [c.position.x, c.position.y].map(|px| on_picture(px, scale));
-    let lattice = |found: ChessboardDetection| found.corners.iter().map(|c| ((c.grid.u, c.grid.v), at(c))).collect();
-    detector.detect_all(&find_corners(&bytes.scaled(scale))).into_iter().map(lattice).collect()
 }
 
 fn no_board() -> Error {

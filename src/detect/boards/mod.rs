@@ -1,7 +1,8 @@
 //! Boards of squares: chessboards, ChArUco boards and PuzzleBoards.
 //!
 //! ```text
-//! picture -> corner_finder (about where corners are; sizes: at which size of the picture) -> labels (which corner of the board each is)
+//! picture -> corner_finder (about where corners are; sizes: at which size of the picture) -> lattices (which are neighbours)
+//!         -> labels (which corner of the board each is)
 //!         -> chessboard, or charuco with charuco_markers, or puzzleboard (one file a kind; corners are measured in `corners`)
 //!         -> ends, seen, charuco_numbers, charuco_seen (is it the board of the plate file, and all of it that is in view)
 //! ```
@@ -14,6 +15,7 @@ pub mod chessboard;
 mod corner_finder;
 mod ends;
 pub(super) mod labels;
+pub(super) mod lattices;
 pub mod puzzleboard;
 pub(super) mod seen;
 mod sizes;

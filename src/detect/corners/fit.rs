@@ -65,6 +65,8 @@ pub(super) struct Seed {
     pub uv: [f64; 2],
     /// Image of one square's side along each of the two edges, px.
     pub sides: [[f64; 2]; 2],
+    /// Curvature of the two edges, 1 / px: positive where they bend from the side along x towards y.
+    pub curvature: [f64; 2],
 }
 
 impl Seed {
@@ -132,7 +134,8 @@ pub(super) fn refine(source: &Source, seed: &Seed, window: Window, look: Look) -
     let guess = start(seed, &pixels, look);
     let contrast = guess[STEP];
     let (noise, full_scale) = (START_NOISE * contrast.abs(), source.full_scale());
-    let mut problem = Problem { pixels, look, noise, contrast, full_scale, level_slope: SLOPE_PER_PX };
+    let curvature = seed.curvature;
+    let mut problem = Problem { pixels, curvature, look, noise, contrast, full_scale, level_slope: SLOPE_PER_PX };
     let near = problem.pixels.near;
     let rough = problem.minimise(problem.at(&guess, near), near, ROUGH)?;
     problem.noise = problem.noise_of(rough.sum.squares, &rough, near);
@@ -187,6 +190,7 @@ impl Pixels {
 /// Least squares over the pixels of one corner.
 struct Problem {
     pixels: Pixels,
+    curvature: [f64; 2],
     look: Look,
     /// Of a pixel, and half the step between the squares, counts: they weigh the priors.
     noise: f64,
@@ -318,7 +322,7 @@ impl Problem {
 
     fn at(&self, state: &Vector, part: Part) -> Point {
         let mut sums = RunningSums::ZERO;
-        let edges = Edges::new(state, self.look.halo);
+        let edges = Edges::new(state, self.curvature, self.look.halo);
         let mut predicted = Prediction::NONE;
         wide(
             #[inline(always)]
@@ -358,7 +362,7 @@ impl Problem {
 
     /// Calls `pixel` for every pixel with its block and lane and the prediction of the block.
     fn for_pixels(&self, state: &Vector, mut pixel: impl FnMut(&Block, usize, &Prediction)) {
-        let edges = Edges::new(state, self.look.halo);
+        let edges = Edges::new(state, self.curvature, self.look.halo);
         let mut predicted = Prediction::NONE;
         for block in &self.pixels.blocks {
             wide(

@@ -6,7 +6,7 @@
 
 use super::fit::{Look, Saddle, Seed, Window, refine};
 use super::lattice::Lattice;
-use super::neighbours::{REACH, seed};
+use super::neighbours::{Bend, REACH, bend, seed};
 use super::refusal::Refusal;
 use super::smooth::Source;
 use crate::detect::Picture;
@@ -22,6 +22,10 @@ const LEAST_BLUR_PX: f64 = 0.38;
 const STEEP_SHARE: f64 = 0.1;
 /// ... by this, px.
 const SMOOTHING_PX: f64 = 0.7;
+/// Edges are bent where this share of them, taken for straight, moves corners by less ...
+const BENT_SHARE: f64 = 0.9;
+/// ... than so much at most, px.
+const BENT_PX: f64 = 0.01;
 /// Usual halo above which the model has one, share of the step.
 const LEAST_HALO: f64 = 0.1;
 
@@ -30,13 +34,15 @@ pub(super) struct Sight<'a> {
     source: Source<'a>,
     window: Window,
     look: Look,
+    /// Whether the lens bends the edges of a window.
+    is_bent: bool,
 }
 
 impl<'a> Sight<'a> {
     /// Looks at some corners of a lattice.
     pub fn of(picture: &'a Picture, lattice: &Lattice, window: Window) -> Self {
         let seeds = samples(lattice);
-        let mut sight = Self { source: Source::plain(picture), window, look: START };
+        let mut sight = Self { source: Source::plain(picture), window, look: START, is_bent: false };
         let fits = sight.sample(&seeds);
         // A corner that cannot be fitted as it is counts as too steep.
         let steep = seeds.len() - fits.iter().filter(|s| !is_steep(s)).count();
@@ -53,6 +59,16 @@ impl<'a> Sight<'a> {
         let mut sight = Self { source, look: START, ..self };
         sight.look = usual(&sight.sample(&samples(lattice)));
         sight
+    }
+
+    /// Takes edges for as bent as the corners show, where that moves corners; whether it does.
+    pub fn bend(&mut self, lattice: &Lattice) -> bool {
+        let Window { reach, radius_px, .. } = self.window;
+        // Taken for straight, an edge lies a third of its sagitta off.
+        let moved = |b: Bend| b.curvature.abs() * radius_px.min(reach * b.side_px).powi(2) / 6.0;
+        let all = lattice.keys().flat_map(|&key| [0, 1].into_iter().filter_map(move |axis| bend(lattice, key, axis)));
+        self.is_bent = quantile(all.map(moved), BENT_SHARE).is_some_and(|moved| moved > BENT_PX);
+        self.is_bent
     }
 
     /// Sigma of the smoothing, if any, px.
@@ -76,7 +92,8 @@ impl<'a> Sight<'a> {
 
     /// Fits a corner.
     pub fn fit(&self, seed: &Seed) -> Result<Saddle, Refusal> {
-        refine(&self.source, seed, self.window, self.look)
+        let curvature = if self.is_bent { seed.curvature } else { [0.0; 2] };
+        refine(&self.source, &Seed { curvature, ..*seed }, self.window, self.look)
     }
 }
 

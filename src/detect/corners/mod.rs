@@ -26,6 +26,7 @@ use refusal::Refusal;
 use rim::out_of_line;
 
 use super::correlated::Correlation;
+use super::pictures::few_levels::few_levels;
 use super::{Detection, Dropped, Picture};
 use crate::linalg::median;
 use crate::series::{Edge, Observation};
@@ -52,6 +53,10 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
     if first.is_unfinished && view.may_be_smoothed() {
         view = view.smoothed(lattice);
         first = First::of(&view, lattice, placement);
+    }
+    let measured = first.on(lattice);
+    if view.bend(&measured) {
+        first = First::of(&view, &measured, placement);
     }
     let First { fitted, retry, mut detection, .. } = first;
     let usual = Usual::of(picture, &fitted);
@@ -104,6 +109,12 @@ struct First {
 }
 
 impl First {
+    /// The lattice with the corners where they were measured.
+    fn on(&self, lattice: &Lattice) -> Lattice {
+        let at = |(key, uv): (&(i32, i32), &[f64; 2])| (*key, self.fitted.get(key).map_or(*uv, |saddle| saddle.uv));
+        lattice.iter().map(at).collect()
+    }
+
     fn of(view: &Sight, lattice: &Lattice, placement: Placement) -> Self {
         let mut first = Self::default();
         for (&key, &uv) in lattice {
@@ -162,7 +173,8 @@ impl Missing<'_> {
 
 /// What most corners of the picture have in common.
 struct Usual<'a> {
-    picture: &'a Picture,
+    /// Where over-exposure shows; `None` for one of few grey levels, of which white is one.
+    picture: Option<&'a Picture>,
     /// Half the step between the squares, counts.
     contrast: f64,
     /// Residual of the fit over that.
@@ -172,7 +184,7 @@ struct Usual<'a> {
 impl<'a> Usual<'a> {
     fn of(picture: &'a Picture, fitted: &BTreeMap<(i32, i32), Saddle>) -> Self {
         Self {
-            picture,
+            picture: few_levels(picture).is_none().then_some(picture),
             contrast: median(fitted.values().map(|s| s.contrast.abs())).unwrap_or(0.0),
             residual: median(fitted.values().map(|s| s.noise / s.contrast.abs())).unwrap_or(0.0),
         }
@@ -185,7 +197,7 @@ impl<'a> Usual<'a> {
             Some("weak or wrong contrast")
         } else if saddle.noise > f64::max(DISTURBED * self.residual, LEAST_DISTURBED) * contrast {
             Some("disturbed surroundings")
-        } else if is_washed_out(self.picture, saddle) {
+        } else if self.picture.is_some_and(|picture| is_washed_out(picture, saddle)) {
             Some("over-exposed")
         } else {
             None

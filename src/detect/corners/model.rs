@@ -5,10 +5,11 @@
 //! ```text
 //! I = min(full scale, b + b_x d_x + b_y d_y + (a + a_x d_x + a_y d_y) P)
 //! P = (1 + o) erf(w1) erf(w2) - o erf(w1 / h) erf(w2 / h)
-//! w1 = u1 + k erf(u2),  w2 = u2 + k erf(u1),  u_i = n_i . (d - c) / (sqrt(2) s_i)
+//! w1 = u1 + k erf(u2),  w2 = u2 + k erf(u1),  u_i = (n_i . (d - c) - q_i (t_i . (d - c))^2 / 2) / (sqrt(2) s_i)
 //! ```
 //!
-//! Two blurred edges with normals n_i and blurs s_i cross at c; the linear terms carry uneven light, k the growth of the
+//! Two blurred edges with tangents t_i, normals n_i and blurs s_i cross at c; the lens bends them by the curvature q_i, which the corners around
+//! tell; the linear terms carry uneven light, k the growth of the
 //! dark squares in print (each edge steps sideways at the crossing), o the halo of sharpened pictures (what an unsharp
 //! mask adds: the picture less its copy with h times the blur), and the clipping leaves over-exposed squares out of the fit.
 
@@ -75,28 +76,36 @@ pub(super) struct Edges<'a> {
     tangents: [[f64; 2]; 2],
     /// 1 / (sqrt(2) s)
     sharpness: [f64; 2],
+    /// 1 / px
+    curvature: [f64; 2],
     /// Whether the halo is part of the model.
     halo: bool,
 }
 
 impl<'a> Edges<'a> {
-    pub fn new(state: &'a Vector, halo: bool) -> Self {
+    pub fn new(state: &'a Vector, curvature: [f64; 2], halo: bool) -> Self {
         Self {
             state,
             tangents: THETA.map(|i| [state[i].cos(), state[i].sin()]),
             sharpness: LN_BLUR.map(|i| (-state[i]).exp() * FRAC_1_SQRT_2),
+            curvature,
             halo,
         }
     }
 
     #[inline(always)]
     pub fn predict(&self, block: &Block, out: &mut Prediction) {
-        if self.halo { self.fill::<true>(block, out) } else { self.fill::<false>(block, out) }
+        match (self.halo, self.curvature != [0.0; 2]) {
+            (false, false) => self.fill::<false, false>(block, out),
+            (false, true) => self.fill::<false, true>(block, out),
+            (true, false) => self.fill::<true, false>(block, out),
+            (true, true) => self.fill::<true, true>(block, out),
+        }
     }
 
     #[inline(always)]
     #[allow(clippy::needless_range_loop, reason = "lanes of many arrays beside each other")]
-    fn fill<const HALOED: bool>(&self, block: &Block, out: &mut Prediction) {
+    fn fill<const HALOED: bool, const BENT: bool>(&self, block: &Block, out: &mut Prediction) {
         let state = self.state;
         let [[t1x, t1y], [t2x, t2y]] = self.tangents;
         let [q1, q2] = self.sharpness;
@@ -105,12 +114,21 @@ impl<'a> Edges<'a> {
         for lane in 0..LANES {
             let (px, py) = (block.x[lane], block.y[lane]);
             let (x, y) = (px - state[0], py - state[1]);
-            let (u1, u2) = ((t1x * y - t1y * x) * q1, (t2x * y - t2y * x) * q2);
+            let (mut a1, mut a2) = (t1x * y - t1y * x, t2x * y - t2y * x);
+            let (s1, s2) = (t1x * x + t1y * y, t2x * x + t2y * y);
+            // Slopes of the edges against their tangents at the crossing, and how far they move as the tangents turn.
+            let (mut b1, mut b2, mut l1, mut l2) = (0.0, 0.0, s1, s2);
+            if BENT {
+                (b1, b2) = (self.curvature[0] * s1, self.curvature[1] * s2);
+                (l1, l2) = (s1 + b1 * a1, s2 + b2 * a2);
+                (a1, a2) = (a1 - 0.5 * b1 * s1, a2 - 0.5 * b2 * s2);
+            }
+            let (u1, u2) = (a1 * q1, a2 * q2);
             let ((e1, g1), (e2, g2)) = (erf_with_slope(u1), erf_with_slope(u2));
             let (w1, w2) = (u1 + k * e2, u2 + k * e1);
-            let ((f1, s1), (f2, s2)) = (erf_with_slope(w1), erf_with_slope(w2));
+            let ((f1, r1), (f2, r2)) = (erf_with_slope(w1), erf_with_slope(w2));
             // The product P with its derivatives by w1, w2 and o.
-            let (mut value, mut p1, mut p2, mut by_halo) = (f1 * f2, s1 * f2, f1 * s2, 0.0);
+            let (mut value, mut p1, mut p2, mut by_halo) = (f1 * f2, r1 * f2, f1 * r2, 0.0);
             if HALOED {
                 let ((h1, t1), (h2, t2)) = (erf_with_slope(w1 / HALO_BLUR), erf_with_slope(w2 / HALO_BLUR));
                 by_halo = value - h1 * h2;
@@ -121,10 +139,11 @@ impl<'a> Edges<'a> {
             let amplitude = state[STEP] + state[STEP_SLOPE[0]] * px + state[STEP_SLOPE[1]] * py;
             // Derivatives by u1 and u2.
             let (d1, d2) = (amplitude * (p1 + p2 * k * g1), amplitude * (p2 + p1 * k * g2));
-            g[0][lane] = d1 * q1 * t1y + d2 * q2 * t2y;
-            g[1][lane] = -d1 * q1 * t1x - d2 * q2 * t2x;
-            g[THETA[0]][lane] = -d1 * q1 * (t1x * x + t1y * y);
-            g[THETA[1]][lane] = -d2 * q2 * (t2x * x + t2y * y);
+            let (m1, m2) = (d1 * q1, d2 * q2);
+            g[0][lane] = m1 * (t1y + b1 * t1x) + m2 * (t2y + b2 * t2x);
+            g[1][lane] = -m1 * (t1x - b1 * t1y) - m2 * (t2x - b2 * t2y);
+            g[THETA[0]][lane] = -m1 * l1;
+            g[THETA[1]][lane] = -m2 * l2;
             g[LN_BLUR[0]][lane] = -d1 * u1;
             g[LN_BLUR[1]][lane] = -d2 * u2;
             g[GROWTH][lane] = amplitude * (p1 * e2 + p2 * e1);
@@ -180,11 +199,12 @@ mod tests {
         let mut state = Vector::zeros();
         let values = [0.3, -0.2, 0.1, 1.4, -0.2, 0.3, 0.15, 0.2, 90.0, 0.1, -0.2, 60.0, 0.05, 0.02];
         state.iter_mut().zip(values).for_each(|(s, v)| *s = v);
-        for (x, y) in [(1.0, 0.5), (-0.7, 2.0), (3.0, -1.0)] {
+        let bends = [[0.0; 2], [0.02, -0.03]];
+        for ((x, y), bent) in [(1.0, 0.5), (-0.7, 2.0), (3.0, -1.0)].into_iter().flat_map(|at| bends.map(|b| (at, b))) {
             let block = Block { x: [x; LANES], y: [y; LANES], ..Block::EMPTY };
             let predicted = |state: &Vector| {
                 let mut prediction = Prediction::NONE;
-                Edges::new(state, true).predict(&block, &mut prediction);
+                Edges::new(state, bent, true).predict(&block, &mut prediction);
                 prediction
             };
             let gradient = predicted(&state).gradient_at(0);

@@ -21,5 +21,26 @@ pub(super) fn seed(lattice: &Lattice, (u, v): (i32, i32), reach: i32) -> Option<
     let near =
         |uv: &&[f64; 2]| (uv[0] - predicted[0]).hypot(uv[1] - predicted[1]) < 0.2 * xu.hypot(yu).min(xv.hypot(yv));
     let uv = lattice.get(&(u, v)).filter(near).copied().unwrap_or(predicted);
-    Some(Seed { uv, sides: [[xu, yu], [xv, yv]] })
+    let curvature = [0, 1].map(|axis| bend(lattice, (u, v), axis).map_or(0.0, |b| b.curvature));
+    Some(Seed { uv, sides: [[xu, yu], [xv, yv]], curvature })
+}
+
+/// How an edge runs through a corner.
+pub(super) struct Bend {
+    /// 1 / px, positive where the edge bends from the one axis towards the other. Perspective bends no edge.
+    pub curvature: f64,
+    /// Length of a square's side, px.
+    pub side_px: f64,
+}
+
+/// The bend of the edge along an axis, from three corners in a row: the middle one is that of the key, where there are such.
+pub(super) fn bend(lattice: &Lattice, (u, v): (i32, i32), axis: usize) -> Option<Bend> {
+    let at = |along: i32| lattice.get(&if axis == 0 { (u + along, v) } else { (u, v + along) });
+    [0, -1, 1].into_iter().find_map(|middle| {
+        let [before, here, after] = [at(middle - 1)?, at(middle)?, at(middle + 1)?];
+        let [x, y] = [0, 1].map(|k| 0.5 * (after[k] - before[k]));
+        let [sx, sy] = [0, 1].map(|k| before[k] - 2.0 * here[k] + after[k]);
+        let side_px = x.hypot(y);
+        Some(Bend { curvature: (x * sy - y * sx) / side_px.powi(3), side_px })
+    })
 }

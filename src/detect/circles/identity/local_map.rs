@@ -3,6 +3,9 @@
 use crate::detect::circles::ellipse::Ellipse;
 use crate::geom::PlaneMap;
 
+/// A map of second order that leaves less than this share of what a projective one leaves is the better one.
+const BENT: f64 = 0.5;
+
 /// Second-order map from the plate (in units of the pitch, relative to the marker, rows down) to the image.
 #[derive(Debug, Clone, Copy)]
 pub struct LocalMap {
@@ -62,6 +65,25 @@ impl LocalMap {
         let map = PlaneMap::fit(pairs)?;
         let (origin, slope) = (map.apply([0.0; 2])?, map.jacobian([0.0; 2])?);
         Some(Self { origin, slope, bend: [[0.0; 3]; 2] })
+    }
+
+    /// As [`Self::projective`], unless a lens bends what the pairs show, far more than perspective does: a fisheye.
+    pub fn beyond(pairs: &[([f64; 2], [f64; 2])]) -> Option<Self> {
+        let straight = PlaneMap::fit(pairs)?;
+        let square = |image: &[f64; 2], [x, y]: [f64; 2]| (image[0] - x).powi(2) + (image[1] - y).powi(2);
+        // Over the residuals that the parameters leave.
+        let [mut by_straight, mut by_bent] = [0.0; 2];
+        if let Some(bent) = Self::with_terms::<6>(pairs) {
+            for (at, image) in pairs {
+                by_straight += square(image, straight.apply(*at)?);
+                by_bent += square(image, bent.at(*at));
+            }
+            let left = |parameters: usize| (2 * pairs.len() - parameters) as f64;
+            if by_bent / left(12) < BENT.powi(2) * by_straight / left(8) {
+                return Some(bent);
+            }
+        }
+        Self::projective(pairs)
     }
 
     /// Image of a plate offset.

@@ -89,7 +89,7 @@ pub fn neighbourhood(board: &Board, cell: Cell, candidates: &[Candidate]) -> Opt
         return LocalMap::fit(&close).map(|m| (m, 0.08));
     }
     let wide = pairs(3);
-    let beyond = if wide.len() >= EXTRAPOLATE { LocalMap::projective(&wide) } else { None };
+    let beyond = if wide.len() >= EXTRAPOLATE { LocalMap::beyond(&wide) } else { None };
     beyond.or_else(|| LocalMap::fit(&pairs(2))).map(|m| (m, 0.25))
 }
 
