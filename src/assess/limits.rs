@@ -109,7 +109,9 @@ limits! {
     times_usual_blur: f64 = 2.0;
     /// Prior sigmas beyond which a deviation is no longer within tolerance.
     sigmas_beyond_tolerance: f64 = 5.0;
-    /// The same beyond which the URDF is of another robot or its zeros are elsewhere: offsets of 2 degrees, origins 15 mm off.
+    /// Share of the markers of a plate that may lie beyond it without the plate itself being another.
+    share_of_markers_moved: f64 = 0.1;
+    /// Prior sigmas beyond which the URDF is of another robot or its zeros are elsewhere: offsets of 2 degrees, origins 15 mm off.
     far_beyond_tolerance: f64 = 15.0;
 
     /// Change of dark images over full scale, in common or from place to place, that is said: a fifth of a percent tilts edges of 100 counts
@@ -256,6 +258,8 @@ limits! {
     same_work_m: f64 = 0.1;
     /// The angle.
     same_work_rad: f64 = 0.1;
+    /// Distance from the base of the robot beyond which a frame that is said to be it, of places or of a program, is another, m.
+    same_base_m: f64 = 0.05;
     /// Distance between the tool of a program and the measured one beyond which they are not the same, m.
     same_tool_m: f64 = 0.05;
     /// Angle between them, where the measured one has an orientation.

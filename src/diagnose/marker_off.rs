@@ -1,11 +1,13 @@
 //! Is every marker where the plate file says, within its tolerance?
 
+use nalgebra::Vector3;
+
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
-use crate::assess::Accuracy;
+use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
-use crate::problem::PlateShape;
-use crate::series::Plate;
+use crate::problem::{Adjustment, PlateShape};
+use crate::series::{Marker, Plate};
 
 /// A marker lies elsewhere than its plate file says.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,16 +23,24 @@ pub struct MarkerOff {
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<MarkerOff> {
     let problem = &fit.problem;
     let several = problem.plates.len() > 1;
-    let off = |(k, (plate, shape)): (usize, (&Plate, &PlateShape))| {
-        let markers = plate.markers.iter().zip(&shape.corrections);
-        let all = markers.map(|(marker, correction)| (marker, correction.norm()));
-        let beyond = all.filter(|(marker, off_m)| *off_m > setting.limits.sigmas_beyond_tolerance * marker.sigma_m);
-        let plate = several.then(|| problem.plate_name(k));
-        beyond
-            .map(|(marker, distance_m)| MarkerOff { marker: marker.id, plate: plate.clone(), distance_m })
-            .collect::<Vec<_>>()
+    let off = |(p, m): (usize, usize)| MarkerOff {
+        marker: problem.plates[p].markers[m].id,
+        plate: several.then(|| problem.plate_name(p)),
+        distance_m: fit.state.plates[p].corrections[m].norm(),
     };
-    problem.plates.iter().zip(&fit.state.plates).enumerate().flat_map(off).collect()
+    markers_off(&fit.adjustment, setting.limits).into_iter().map(off).collect()
+}
+
+/// Markers far beyond their tolerance, each with its plate.
+pub fn markers_off(Adjustment { problem, state }: &Adjustment, limits: &Limits) -> Vec<(usize, usize)> {
+    let of_plate = |(p, (plate, shape)): (usize, (&Plate, &PlateShape))| {
+        let all = plate.markers.iter().zip(&shape.corrections).enumerate();
+        let is_off = |(_, (marker, correction)): &(usize, (&Marker, &Vector3<f64>))| {
+            correction.norm() > limits.sigmas_beyond_tolerance * marker.sigma_m
+        };
+        all.filter(is_off).map(|(m, _)| (p, m)).collect::<Vec<_>>()
+    };
+    problem.plates.iter().zip(&state.plates).enumerate().flat_map(of_plate).collect()
 }
 
 impl Kind for MarkerOff {

@@ -170,6 +170,14 @@ fn uneven(adjustment: &Adjustment, plate: usize, limits: &Limits) -> Option<(f64
 }
 
 impl DoubtedSize {
+    /// The same of the plate of a series, which others do not share.
+    #[must_use]
+    pub fn of_series(mut self, series: &str) -> Self {
+        let (Self::Contradicted { plate, .. } | Self::Uneven { plate, .. }) = &mut self;
+        *plate = format!("{plate} of series {series}");
+        self
+    }
+
     /// What is in order without the doubt, where that fails the result.
     fn in_order(&self) -> Option<&InOrder> {
         let (Self::Contradicted { in_order, .. } | Self::Uneven { in_order, .. }) = self;
@@ -313,6 +321,7 @@ struct ReleasedSize<'a> {
 fn release(adjustment: &mut Adjustment, index: usize) {
     let at = adjustment.problem.layout.shapes[index].start + SCALE;
     adjustment.problem.layout.columns[at].prior_sigma = UNKNOWN_SCALE;
+    adjustment.problem.moved_markers.retain(|(plate, _)| *plate != index);
     let released = &mut adjustment.problem.plates[index];
     released.scale = None;
     // The markers keep the shape that was found, and grow with the plate: corrections with a tolerance in metres, and modes beside the stated size, would
@@ -404,7 +413,7 @@ impl<'a> ReleasedSize<'a> {
     }
 }
 
-/// A marker of a plate that was seen: where it should be, by its file, where it is, and the variance per axis that its tolerance leaves it.
+/// A marker of a plate that was seen, and is none that was moved: where it should be, by its file, where it is, and the variance per axis that its tolerance leaves it.
 struct Place {
     stated: Vector3<f64>,
     found: Vector3<f64>,
@@ -417,7 +426,8 @@ fn places(problem: &Problem, shape: &PlateShape, plate: usize) -> Vec<Place> {
         found: shape.position(m),
         variance: problem.marker_information(plate, m).recip(),
     };
-    seen_markers(problem, plate).into_iter().map(place).collect()
+    let told = seen_markers(problem, plate).into_iter().filter(|m| !problem.moved_markers.contains(&(plate, *m)));
+    told.map(place).collect()
 }
 
 /// By how much the markers of a plate that were seen lie further apart than its file says.

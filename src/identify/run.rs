@@ -20,7 +20,7 @@ use crate::urdf::Chain;
 /// Most times that postures are told anew by the identified robot.
 const RETELLINGS: usize = 3;
 
-/// Identifies robot, cameras, mountings and plates from identified series. The automatic model is the largest that no smaller one
+/// Identifies robot, cameras, mountings and plates from identified series. The automatic model is the largest that no other
 /// beats decisively; whoever names a joint term wants all of them.
 ///
 /// # Errors

@@ -355,9 +355,10 @@ impl Robot {
 }
 
 impl RobotModel {
-    /// True where this model has such a term.
-    pub fn has(self, term: Term) -> bool {
-        term.model() <= self
+    /// True where this model has such a term of a reading of a chain.
+    pub fn has(self, term: Term, chain: &Chain, reading: usize) -> bool {
+        let smallest = if chain.carries_arm(reading) { term.model_of_arm() } else { term.model() };
+        self.contains(smallest) && term.applies(chain)
     }
 
     /// The nominal robot with the terms of this model.
@@ -367,9 +368,10 @@ impl RobotModel {
 
     /// As [`RobotModel::robot`], with this many harmonics of every gear.
     pub fn robot_with(self, chain: Chain, harmonics: u8) -> Robot {
-        let terms: Vec<Term> = Term::all(harmonics).into_iter().filter(|t| self.has(*t) && t.applies(&chain)).collect();
-        let of_joint = |reading: usize| terms.iter().map(move |&term| JointTerm { reading, term, value: 0.0 });
-        let terms = (0..chain.readings.len()).flat_map(of_joint).collect();
+        let all = Term::all(harmonics);
+        let of_chain = (0..chain.readings.len()).flat_map(|reading| all.iter().map(move |&term| (reading, term)));
+        let own = of_chain.filter(|&(reading, term)| self.has(term, &chain, reading));
+        let terms = own.map(|(reading, term)| JointTerm { reading, term, value: 0.0 }).collect();
         Robot { terms, ..Robot::nominal(chain) }
     }
 }

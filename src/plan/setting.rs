@@ -1,5 +1,6 @@
 //! What is roughly known before the measurement, as a problem without images.
 
+use std::collections::BTreeSet;
 use std::iter;
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
@@ -116,6 +117,7 @@ impl Setting {
             body_measurements: Vec::new(),
             lengths: Vec::new(),
             families: Vec::new(),
+            moved_markers: BTreeSet::new(),
             restraint: None,
             // Predictions have no residuals, so that it never acts.
             huber: HUBER,

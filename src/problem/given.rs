@@ -1,5 +1,7 @@
 //! What is given: data, columns, and what is known beforehand.
 
+use std::collections::BTreeSet;
+
 use super::body::{BodyMeasurement, Instrument};
 use super::bounds::Bounds;
 use super::family::Family;
@@ -15,6 +17,9 @@ use crate::series::Plate;
 /// Smallest prior sigma of a marker coordinate, m: below it a marker counts as fixed.
 const FIXED_MARKER_SIGMA_M: f64 = 1e-9;
 
+/// Prior sigma of a coordinate of a marker that is elsewhere, m: nothing is known of where it is.
+const MOVED_MARKER_SIGMA_M: f64 = 0.1;
+
 /// Stops seen by several cameras that tell the sizes of apparent displacements from joint noise.
 const LEAST_SHARED_STOPS: usize = 8;
 
@@ -25,6 +30,8 @@ pub struct Problem {
     pub layout: Layout,
     /// Plates, nominal.
     pub plates: Vec<Plate>,
+    /// Markers that lie far from where their plate says, by plate: they tell nothing of its size and shape.
+    pub moved_markers: BTreeSet<(usize, usize)>,
     /// Names of the placements.
     pub placements: Vec<String>,
     /// Names of the mountings.
@@ -185,6 +192,9 @@ impl Problem {
 
     /// Information of the prior of a marker's correction, per coordinate, 1/m^2.
     pub fn marker_information(&self, plate: usize, marker: usize) -> f64 {
+        if self.moved_markers.contains(&(plate, marker)) {
+            return MOVED_MARKER_SIGMA_M.powi(-2);
+        }
         let factor = self.noise.marker.get(plate).copied().unwrap_or(1.0);
         (factor * self.plates[plate].markers[marker].sigma_m).max(FIXED_MARKER_SIGMA_M).powi(-2)
     }

@@ -27,6 +27,9 @@ const LEAST_CARRIED_KG: f64 = 1.0;
 /// How far a centre of mass may be from the tip link, m.
 const FARTHEST_PAYLOAD_M: f64 = 3.0;
 
+/// Share of the greatest length that a joint carries from which it carries the arm.
+const OF_THE_ARM: f64 = 1.0 / 3.0;
+
 /// Fewest links whose masses, all the same, are placeholders.
 const ALIKE: usize = 3;
 
@@ -102,6 +105,19 @@ impl Chain {
             if self.joints[index].kind == JointKind::Prismatic { 1.0 } else { links + m.centre_m.norm() }
         };
         self.masses_on(index).map(|m| m.mass_kg * lever(m)).sum()
+    }
+
+    /// True where the joint of a reading carries the arm: links of a third at least of the greatest length that a joint carries. Those of
+    /// a wrist carry a hand.
+    pub fn carries_arm(&self, reading: usize) -> bool {
+        let length = |index: usize| -> f64 {
+            let carried = if self.joints[index].upwards { 0..index } else { index + 1..self.joints.len() };
+            self.joints[carried].iter().map(|j| j.origin.translation.norm()).sum()
+        };
+        let driven = |index: &usize| self.joints[*index].drive.is_some();
+        let of_reading = |index: &usize| self.joints[*index].drive.is_some_and(|d| d.reading == reading);
+        let longest = |is: &dyn Fn(&usize) -> bool| (0..self.joints.len()).filter(is).map(length).fold(0.0, f64::max);
+        longest(&of_reading) >= OF_THE_ARM * longest(&driven)
     }
 }
 

@@ -5,6 +5,8 @@ use robotcal::assess::flange_error_m;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Selection, StatedPrior, identify};
 use robotcal::linalg::median;
+use robotcal::model::joint_terms::TermKind;
+use robotcal::model::robot::Robot;
 use robotcal::problem::MeasuredSeries;
 use robotcal::problem::OriginPrior;
 use robotcal::series::{Plate, PlateKind};
@@ -88,4 +90,50 @@ fn how_far_origins_are_off_is_told_by_the_robot_itself() {
         let expected = if column.unit == "m" { 0.4e-3 } else { problem.twist_factor() * usual.rotation_rad };
         assert!((column.prior_sigma / expected - 1.0).abs() < 1e-9, "{}: {}", column.name, column.prior_sigma);
     }
+}
+
+/// Readings at which an arm whose second and third joint sag by this much under a weight at the tip, most of it stretched out, stands as without
+/// sag at these.
+fn read_with_sag(q: &[f64], sag_rad: f64) -> Vec<f64> {
+    let robot = Robot::nominal(kr6());
+    let height_m = |q: &[f64]| robot.base_from_tip(q).translation.z;
+    let lever_m = |joint: usize| {
+        let mut moved = q.to_vec();
+        moved[joint] += 1e-4;
+        (height_m(&moved) - height_m(q)) / 1e-4
+    };
+    // The weight pulls against what lifts it, at a lever of nearly a metre.
+    let mut read = q.to_vec();
+    [1, 2].into_iter().for_each(|joint| read[joint] += sag_rad * lever_m(joint));
+    read
+}
+
+/// Where two joints sag the model has their gravity, whatever else it has to pay for, and states what it is off by.
+#[test]
+fn sag_of_the_joints_that_carry_the_arm_is_taken_for_no_gear() {
+    let errors = |seed: u64| {
+        let mut world = world(RobotErrors::default(), seed);
+        let mut seen = measured(&world, &kr6());
+        seen.stops.truncate(20);
+        for readings in seen.stops.iter_mut().filter_map(|stop| stop.readings.as_mut()) {
+            *readings = read_with_sag(readings, 0.5e-3);
+        }
+        world.truth.held_out.iter_mut().for_each(|h| h.readings = read_with_sag(&h.readings, 0.5e-3));
+        let solution = identify(kr6(), &[seen], &Options::default()).unwrap();
+        let poses: Vec<(Vec<f64>, Pose)> =
+            world.truth.held_out.iter().map(|h| (h.readings.clone(), h.base_from_tip.pose())).collect();
+        let state = &solution.fit.state;
+        let found = flange_error_m(&state.robot, &state.placements[0], &poses).unwrap();
+        let stated = solution.uncertainty.flange.unwrap().model_m;
+        println!("seed {seed}: {:.3} mm, stated {:.3}; {:?}", 1e3 * found, 1e3 * stated, solution.evidences);
+        let models: Vec<RobotModel> = solution.evidences.iter().map(|e| e.model).collect();
+        assert_eq!(models, RobotModel::CHOICES);
+        let has = |kind: TermKind| state.robot.terms.iter().any(|t| t.term.kind() == kind);
+        assert!(has(TermKind::Gravity) && !has(TermKind::Gear) && !has(TermKind::Backlash), "seed {seed}");
+        (found, stated)
+    };
+    let all: Vec<(f64, f64)> = (1..=seeds()).map(errors).collect();
+    let squares = |of: fn(&(f64, f64)) -> f64| all.iter().map(|both| of(both).powi(2)).sum::<f64>();
+    let ratio = (squares(|both| both.0) / squares(|both| both.1)).sqrt();
+    assert!(ratio < 1.5, "{all:?}");
 }

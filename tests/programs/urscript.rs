@@ -394,6 +394,7 @@ fn joints_taught_beside_poses_tell_the_posture_of_each() {
             assert_eq!(literal(&text, &format!("w{k}_q")), literal(&run.text("taught.script"), &format!("w{k}_q")));
         }
         assert!(before > 1e-3, "{before}");
+        assert!(column(&run, "joint_unit").iter().all(|unit| unit == "rad"));
         let known = column(&run, "posture");
         assert!((0..24).all(|k| known[k] == if k % 3 == 1 { "near" } else { "taught" }), "{known:?}");
         let (weight, told) = &findings(&run)["nominal_is_controllers"];

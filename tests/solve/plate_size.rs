@@ -4,7 +4,7 @@ use crate::robots::kr6;
 use nalgebra::Vector3;
 use robotcal::Code;
 use robotcal::assess::Limits;
-use robotcal::diagnose::{DoubtedSize, Finding, Weight};
+use robotcal::diagnose::{DoubtedSize, Finding, Subject, Weight};
 use robotcal::identify::{Estimator, Options, RobotModel, Solution, identify, stand_alone};
 use robotcal::model::plate_modes::DOT_GAIN;
 use robotcal::problem::{MeasuredSeries, SCALE};
@@ -59,6 +59,27 @@ fn stretch(solution: &Solution, from: usize, to: usize) -> f64 {
     let (found, stated) = (&solution.fit.state.plates[0], &solution.fit.problem.plates[0].markers);
     let stated = (stated[from].position_m - stated[to].position_m).norm();
     (found.position(from) - found.position(to)).norm() / stated - 1.0
+}
+
+/// A marker that is named as far off tells nothing of the size: the plate is as large as without it.
+#[test]
+fn a_marker_that_is_named_as_off_does_not_pull_the_size_of_the_plate() {
+    let as_stated = stated_series(1.0, 1.0, None);
+    let mut moved = as_stated.clone();
+    let (corner, far) = (0, as_stated.plate.markers.len() - 1);
+    let outwards = moved.plate.markers[corner].position_m.normalize();
+    // The others were printed right; this one lies 3 mm nearer to the middle than its file says.
+    moved.plate.markers[corner].position_m += 3e-3 * outwards;
+    let [before, after] = [as_stated, moved].map(|series| identify(kr6(), &[series], &Options::default()).unwrap());
+    let named = after.findings.iter().filter(|f| f.code() == Code::MarkerOff).count();
+    let distance_m = |s: &Solution| {
+        let found = &s.fit.state.plates[0];
+        (found.position(corner + 1) - found.position(far)).norm()
+    };
+    let pulled_m = distance_m(&after) - distance_m(&before);
+    println!("pulled by {:.4} mm", 1e3 * pulled_m);
+    assert_eq!(named, 1, "{:?}", after.findings);
+    assert!(pulled_m.abs() < 2e-5, "{pulled_m}");
 }
 
 #[test]
@@ -157,6 +178,22 @@ fn what_a_wrong_print_makes_of_a_robot_is_not_said_beside_it() {
             assert!(is_noisy || !codes.contains(&Code::ParameterOff), "{codes:?}");
         }
     }
+}
+
+/// Two prints by one file, of which one is 3 % longer along x: it is named, and not the plate that the two would be.
+#[test]
+fn of_two_prints_that_are_taken_for_one_plate_the_stretched_one_is_named() {
+    let mut as_printed = request(&kr6());
+    as_printed.plate.markers.iter_mut().for_each(|m| m.position_m.x /= 1.03);
+    let long = MeasuredSeries { name: "long".into(), ..stated_series(1.0 / 1.03, 1.0, None) };
+    let good = seen(&kr6(), &WorldRequest { seed: 10, ..as_printed }).0;
+    let good = MeasuredSeries { name: "good".into(), plate: long.plate.clone(), ..good };
+    let found = stand_alone(&[good, long], &Limits::default()).unwrap();
+    assert_eq!(found.fit.problem.plates.len(), 1);
+    let doubts: Vec<&Finding> = found.findings.iter().filter(|f| matches!(f, Finding::DoubtedSize(_))).collect();
+    let [said] = doubts[..] else { panic!("{:?}", found.findings) };
+    assert!((said.quantities()[0].value - 0.03).abs() < 2e-3, "{said}");
+    assert_eq!(said.subjects(), [Subject::Body("plate of series long".into())]);
 }
 
 /// The shape of a plate shows in images alone, its size does not.

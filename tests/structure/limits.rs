@@ -297,6 +297,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("problem/family.rs HELD", "rounding"),
     ("problem/family.rs TWISTS_DRAWN", "prior of a variance component"),
     ("problem/given.rs FIXED_MARKER_SIGMA_M", "rounding of a prior"),
+    ("problem/given.rs MOVED_MARKER_SIGMA_M", "a prior that says nothing"),
     ("problem/given.rs HUBER", "loss function of the solver"),
     ("problem/given.rs LEAST_SHARED_STOPS", "samples of a variance"),
     ("problem/plate_distance.rs UNKNOWN_SCALE", "prior that says nothing"),

@@ -293,6 +293,7 @@ pub fn problem(dice: &mut Dice, request: &Request) -> (Problem, State) {
             lengths: Vec::new(),
             noise,
             families: Vec::new(),
+            moved_markers: Default::default(),
             restraint: None,
             huber: 2.45,
             bounds: Limits::default().bounds(),

@@ -153,7 +153,7 @@ impl Choice {
         Ok(Some(MeasuredFrames {
             to: frames_of(to),
             from: from.as_ref().map(|f| frames_of(f)),
-            base_within: to.work_is_base().then_some((limits.same_tool_m, limits.same_work_rad)),
+            base_within: to.work_is_base().then_some((limits.same_base_m, limits.same_work_rad)),
             tool: setting.tool,
             work: setting.work.map(|work| setting.base * work),
             unsaid: (language == Language::UrScript).then_some(setting.base),

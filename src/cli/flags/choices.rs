@@ -53,9 +53,13 @@ pub enum Model {
     Rigid,
     /// Also gear scale and two harmonics
     Gear,
-    /// Also gravity and backlash
+    /// Link geometry, joint offsets, and gravity of the joints that carry the arm; of all joints where the URDF states masses
+    Sag,
+    /// All of these
+    GearSag,
+    /// All of these, gravity of all joints, and backlash
     Full,
-    /// The largest of these that no smaller one beats decisively, by the data (Laplace evidence)
+    /// The largest of these that no other beats decisively, by the data (Laplace evidence)
     Auto,
 }
 
@@ -73,6 +77,8 @@ impl From<Model> for RobotModel {
         match model {
             Model::Rigid => Self::Rigid,
             Model::Gear => Self::Gear,
+            Model::Sag => Self::Sag,
+            Model::GearSag => Self::GearSag,
             Model::Full => Self::Full,
             Model::Auto => Self::Auto,
         }

@@ -29,6 +29,8 @@ pub enum Carried {
     Bracket,
     /// What all sockets are fixed to.
     Fixture,
+    /// What some sockets are fixed to: the others were not touched both before and behind, and nothing tells of them.
+    FixtureOfSome,
 }
 
 /// In which images it stands elsewhere.
@@ -106,6 +108,7 @@ impl Displaced {
             Carried::Target => "target on the tip",
             Carried::Bracket => "bracket of all targets on the tip",
             Carried::Fixture => "fixture of all sockets",
+            Carried::FixtureOfSome => "fixture of sockets",
         }
     }
 
@@ -126,6 +129,9 @@ impl Displaced {
             Carried::Target => format!("give the target another name in {}", self.series),
             Carried::Bracket => format!("give all targets other names in {}", self.series),
             Carried::Fixture => format!("give all contacts other names in {}", self.series),
+            Carried::FixtureOfSome => {
+                format!("give contacts {} other names in {}", self.places.join(", "), self.series)
+            }
         }
     }
 }
@@ -142,7 +148,7 @@ impl Kind for Displaced {
             Carried::Camera | Carried::CameraInHand => of(Code::CameraDisplaced, Code::CameraDrifts, Code::CameraLoose),
             Carried::Instrument => of(Code::TrackerDisplaced, Code::TrackerDrifts, Code::TrackerDisplaced),
             Carried::Target | Carried::Bracket => of(Code::TargetDisplaced, Code::TargetDrifts, Code::TargetDisplaced),
-            Carried::Fixture | Carried::Places | Carried::Socket => Code::WorkDisplaced,
+            Carried::Fixture | Carried::FixtureOfSome | Carried::Places | Carried::Socket => Code::WorkDisplaced,
         }
     }
 
@@ -173,7 +179,7 @@ impl Kind for Displaced {
 
     fn seen(&self) -> String {
         let body = match self.body {
-            Carried::Socket => format!("{} {}", self.body(), self.places.join(", ")),
+            Carried::Socket | Carried::FixtureOfSome => format!("{} {}", self.body(), self.places.join(", ")),
             _ => self.body().to_owned(),
         };
         let (far, far_sigma) = (1e3 * self.distance_m.0, 1e3 * self.distance_m.1);
@@ -194,6 +200,7 @@ impl Kind for Displaced {
                 let touched = match self.body {
                     Carried::Camera | Carried::CameraInHand => ", creeps, or its lens was touched".to_owned(),
                     Carried::Fixture => format!(" with {}, or the base of the robot", self.places.join(", ")),
+                    Carried::FixtureOfSome => ", or the base of the robot".to_owned(),
                     _ => ", or creeps".to_owned(),
                 };
                 format!(
@@ -263,6 +270,11 @@ impl Kind for Displaced {
                         self.first()
                     )
                 }
+                Carried::FixtureOfSome => format!(
+                    "give contacts {} other names from {} on, or fasten them and measure again",
+                    self.places.join(", "),
+                    self.first()
+                ),
             },
             Displacement::InAll => self.remedy_between_series(),
             Displacement::ByTurns => {

@@ -182,9 +182,12 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     let (distance_m, angle_rad) = (step.size(0), (step.change.len() > 3).then(|| step.size(3)));
     let matters = distance_m.0 > limits.displaced_m || angle_rad.is_some_and(|angle| angle.0 > limits.displaced_rad);
     let weight = weight(matters);
-    let (body, mounting) = carried(step.changed, first, problem)?;
-    let is_of_sockets = matches!(body, Carried::Fixture | Carried::Socket);
-    let places = if is_of_sockets { sockets(step, problem) } else { Vec::new() };
+    let (body, mounting) = carried(step, first, problem)?;
+    let places = match body {
+        Carried::Socket => names(&sockets(step, problem), problem),
+        Carried::Fixture | Carried::FixtureOfSome => names(&told_sockets(step, problem), problem),
+        _ => Vec::new(),
+    };
     Some(
         Displaced {
             series,
@@ -203,10 +206,31 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     )
 }
 
-/// Names of the sockets that it moves.
-fn sockets(step: &Step, problem: &Problem) -> Vec<String> {
-    let all: BTreeSet<usize> = step.shown.iter().filter_map(|shown| shown.socket(problem)).collect();
-    all.into_iter().map(|socket| problem.instruments[socket].name.clone()).collect()
+/// The sockets that it moves.
+fn sockets(step: &Step, problem: &Problem) -> BTreeSet<usize> {
+    step.shown.iter().filter_map(|shown| shown.socket(problem)).collect()
+}
+
+/// Those of them that tell of it: they were touched where it stands as before, too. All of them where it creeps.
+fn told_sockets(step: &Step, problem: &Problem) -> BTreeSet<usize> {
+    let is_moved = |k: usize| step.shown.iter().any(|shown| matches!(*shown, Shown::Measurement(moved) if moved == k));
+    let mut told = sockets(step, problem);
+    if step.order != Order::Drift {
+        let still = problem.used_bodies().filter(|(k, _)| !is_moved(*k));
+        let still: BTreeSet<usize> = still.map(|(_, measured)| measured.instrument).collect();
+        told.retain(|socket| still.contains(socket));
+    }
+    told
+}
+
+/// Every socket that holds a body.
+fn all_sockets(problem: &Problem) -> BTreeSet<usize> {
+    let used = problem.used_bodies().map(|(_, measured)| measured.instrument);
+    used.filter(|instrument| is_socket(problem, *instrument)).collect()
+}
+
+fn names(sockets: &BTreeSet<usize>, problem: &Problem) -> Vec<String> {
+    sockets.iter().map(|socket| problem.instruments[*socket].name.clone()).collect()
 }
 
 /// Said where the images by themselves do not say so.
@@ -231,7 +255,8 @@ fn refocused(
 }
 
 /// What stands elsewhere, and the name of its mounting, tracker or target.
-fn carried(changed: Changed, first: Shown, problem: &Problem) -> Option<(Carried, String)> {
+fn carried(step: &Step, first: Shown, problem: &Problem) -> Option<(Carried, String)> {
+    let changed = step.changed;
     Some(match (changed, first) {
         (Changed::Instrument(i), _) if !is_socket(problem, i) => {
             let instrument = &problem.instruments[i];
@@ -246,7 +271,11 @@ fn carried(changed: Changed, first: Shown, problem: &Problem) -> Option<(Carried
         (Changed::Fixture | Changed::Instrument(_), Shown::Measurement(k)) => {
             let component = problem.instruments[problem.body_measurements[k].instrument].component;
             let first = problem.instruments.iter().find(|i| i.component == component)?;
-            let body = if changed == Changed::Fixture { Carried::Fixture } else { Carried::Socket };
+            let body = match changed {
+                Changed::Fixture if told_sockets(step, problem) == all_sockets(problem) => Carried::Fixture,
+                Changed::Fixture => Carried::FixtureOfSome,
+                _ => Carried::Socket,
+            };
             (body, first.name.clone())
         }
         (Changed::Placement(_) | Changed::Mounting(_), Shown::Image { index, .. }) => {

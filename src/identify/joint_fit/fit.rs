@@ -1,6 +1,7 @@
 //! The joint fit: robot, cameras, hand-camera offsets and plates directly against the pixels, with joint noise.
 
 use super::measured_lengths::{leave_all_out, leave_worst_out, take_agreeing};
+use super::moved_markers::let_go;
 use super::unpredicted::nothing_held_out;
 use crate::assess::{Limits, hold_out, hold_out_bodies, judge, refitted_near};
 use crate::diagnose::{CheckContext, Diagnosis, Finding, StatedNoise};
@@ -250,6 +251,13 @@ fn fit(
         outcome = estimate_components(outcome.adjustment, &components);
     }
     outcome = without_contradicting(outcome, &components, &options.limits);
+    for _ in 0..ROUNDS {
+        if !let_go(&mut outcome.adjustment, &options.limits) {
+            break;
+        }
+        outcome =
+            without_contradicting(estimate_components(outcome.adjustment, &components), &components, &options.limits);
+    }
     if take_agreeing(&mut outcome, &options.limits) {
         outcome = estimate_components(outcome.adjustment, &components);
         outcome = without_contradicting(outcome, &components, &options.limits);

@@ -13,7 +13,7 @@ use crate::identify::options::{JointNoise, Options};
 use crate::identify::problem::build::FIRST_JOINT_NOISE;
 use crate::identify::solution::Evidence;
 use crate::linalg::SymmetricFactor;
-use crate::model::joint_terms::RobotModel;
+use crate::model::joint_terms::{JointTerm, RobotModel};
 use crate::problem::{Adjustment, MeasuredSeries};
 use crate::solve::{
     ComponentOptions, JOINT_NOISE_FLOOR, LinearProblem, Settings, estimate_components, side_by_side, solve,
@@ -31,7 +31,7 @@ const SOME_STOPS: usize = 1000;
 /// Rounds in which a model finds its joint noise: its size is then known to a few percent.
 const ROUNDS: usize = 8;
 
-/// The fit of the smallest robot model that the evidence supports, from that of the full one; that of the full one where it has none itself.
+/// The fit of the largest robot model that none beats by evidence, from that of the full one; that of the full one where it has none itself.
 pub(in crate::identify) fn best_model(
     chain: Chain,
     series: &[MeasuredSeries],
@@ -82,7 +82,7 @@ type Compared = (Vec<(Evidence, Adjustment)>, Vec<(RobotModel, NoEvidence)>);
 
 /// Compares them: smaller ones with their own joint noise, where it is `estimated`.
 fn compare_models(full: &Fit, estimated: bool) -> Compared {
-    let models = [RobotModel::Rigid, RobotModel::Gear, RobotModel::Full];
+    let models = RobotModel::CHOICES;
     let found = side_by_side(&full.problem, &models, |_, model| evidence(full, *model, estimated));
     let (mut all, mut without) = (Vec::new(), Vec::new());
     for (model, found) in models.into_iter().zip(found) {
@@ -129,8 +129,9 @@ fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> std::result::Resu
 
 /// Terms of the robot that a smaller model does not have.
 fn dropped_terms(full: &Adjustment, model: RobotModel) -> Vec<usize> {
-    let terms = full.state.robot.terms.iter().enumerate();
-    terms.filter(|(_, t)| !model.has(t.term)).map(|(k, _)| k).collect()
+    let robot = &full.state.robot;
+    let is_dropped = |t: &JointTerm| !model.has(t.term, &robot.chain, t.reading);
+    robot.terms.iter().enumerate().filter(|(_, t)| is_dropped(t)).map(|(k, _)| k).collect()
 }
 
 /// Without some terms of the robot: a condition on the full model, under which everything else goes where the covariance leads.

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, Matrix3, Matrix3x6, Matrix6};
 
 use crate::assess::{Limits, camera_shows_pattern};
 use crate::diagnose::{
-    CheckContext, Diagnosis, Finding, many_left_out, observations_left_out, residual_pattern, tags_off, uneven_plates,
+    CheckContext, Diagnosis, DoubtedSize, Finding, many_left_out, observations_left_out, residual_pattern, tags_off,
+    uneven_plates,
 };
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{Fit, FreePose, FreePoses, PlacedCamera};
@@ -114,10 +115,27 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     findings.extend(observations_left_out(&fit, limits).map(|found| found.given_by(&series).into()));
     findings.extend(residual_pattern(&fit, limits).map(|found| found.given_by(&series).into()));
     findings.extend(tags_off(&fit, limits).into_iter().map(Finding::from));
-    findings.extend(uneven_plates(&fit, limits).into_iter().map(Finding::from));
+    let is_doubted = findings.iter().any(Finding::fails);
+    findings.extend(uneven(&fit, &series, is_doubted, limits).into_iter().map(Finding::from));
     let lost = losses(&fit.adjustment, &free_poses, &series).into_iter().filter(|lens| lens.loss_px.is_none());
     findings.extend(lost.map(Finding::from));
     Ok(StandAlone { fit, free_poses, series, starts, notices, findings })
+}
+
+/// Plates whose rows and columns differ in scale. Where series that are taken for ones of a single plate do not go together, each is looked at by
+/// itself: one print may be another than the others.
+fn uneven(fit: &Fit, series: &[MeasuredSeries], is_doubted: bool, limits: &Limits) -> Vec<DoubtedSize> {
+    let together = uneven_plates(fit, limits);
+    if fit.problem.plates.len() == series.len() || together.is_empty() && !is_doubted {
+        return together;
+    }
+    let alone = |own: &MeasuredSeries| {
+        let fit = adjusted(std::slice::from_ref(own), limits).ok()?.fit;
+        Some(uneven_plates(&fit, limits).into_iter().map(|doubted| doubted.of_series(&own.name)).collect::<Vec<_>>())
+    };
+    let alone: Vec<Vec<DoubtedSize>> = series.iter().filter_map(alone).collect();
+    let is_one = alone.len() < series.len() || alone.iter().all(|own| own.is_empty() == alone[0].is_empty());
+    if is_one { together } else { alone.concat() }
 }
 
 /// Free poses with the lenses that the series have.

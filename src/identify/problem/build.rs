@@ -1,6 +1,6 @@
 //! Identified series to a problem: who shares what, by name.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -83,6 +83,7 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
         lengths: bodies.lengths,
         noise,
         families,
+        moved_markers: BTreeSet::new(),
         restraint: None,
         huber: HUBER,
         bounds: limits.bounds(),

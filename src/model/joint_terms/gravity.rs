@@ -17,6 +17,7 @@ impl JointError for Gravity {
     const PRIOR_SIGMA: f64 = 0.3e-3;
     const TYPICAL: f64 = 0.2e-3;
     const MODEL: RobotModel = RobotModel::Full;
+    const MODEL_OF_ARM: RobotModel = RobotModel::Sag;
     const SUMMAND: &'static str = "sum_i gravity_i m_i(q)";
     const SYMBOLS: &'static [&'static str] = &[
         "gravity in rad (m for a prismatic joint).",

@@ -96,6 +96,9 @@ pub(super) trait JointError {
     /// The smallest robot model that has terms of this kind; larger ones have them, too.
     const MODEL: RobotModel;
 
+    /// The same for joints that carry the arm ([`Chain::carries_arm`]).
+    const MODEL_OF_ARM: RobotModel = Self::MODEL;
+
     /// The terms that a joint gets in such a model, where gears have this many harmonics.
     fn indices(harmonics: u8) -> Vec<Self::Index>;
 

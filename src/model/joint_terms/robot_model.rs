@@ -1,25 +1,39 @@
 //! Which joint errors a model of the robot has.
 
-/// Which joint terms are fitted beside twists; each model has the terms of those before it.
+/// Which joint terms are fitted beside twists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum RobotModel {
     /// Joint offsets.
     Rigid,
     /// Offsets, gear scale, two harmonics.
     Gear,
-    /// All of these, gravity and backlash.
+    /// Offsets, gravity of the joints that carry the arm; of all joints where masses are known.
+    Sag,
+    /// All of these.
+    GearSag,
+    /// All of these, gravity of all joints, and backlash.
     Full,
-    /// The largest of these that no smaller one beats by evidence.
+    /// The largest of these that no other beats by evidence.
     Auto,
 }
 
 impl RobotModel {
+    /// Those among which the data choose.
+    pub const CHOICES: [Self; 5] = [Self::Rigid, Self::Gear, Self::Sag, Self::GearSag, Self::Full];
+
+    /// True where it has all terms of another.
+    pub(in crate::model) fn contains(self, other: Self) -> bool {
+        other <= self && (self, other) != (Self::Sag, Self::Gear)
+    }
+
     /// Its name in options and files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Rigid => "rigid",
             Self::Gear => "gear",
+            Self::Sag => "sag",
+            Self::GearSag => "gear-sag",
             Self::Full => "full",
             Self::Auto => "auto",
         }
@@ -30,6 +44,8 @@ impl RobotModel {
         match self {
             Self::Rigid => "rigid robot model",
             Self::Gear => "robot model with gears",
+            Self::Sag => "robot model with sag",
+            Self::GearSag => "robot model with gears and sag",
             Self::Full => "full robot model",
             Self::Auto => "robot model by evidence",
         }

@@ -14,7 +14,7 @@ impl JointError for Sag {
     const NAME: &'static str = "sag";
     const PRIOR_SIGMA: f64 = 1e-3;
     const TYPICAL: f64 = 0.2e-3;
-    const MODEL: RobotModel = RobotModel::Full;
+    const MODEL: RobotModel = RobotModel::Sag;
     const SUMMAND: &'static str = "compliance_rad_per_nm T(q)";
     const SYMBOLS: &'static [&'static str] = &[
         "T: moment of gravity about the axis, N m (force along it, N, for a prismatic joint), of the masses in the URDF and the [payload]",

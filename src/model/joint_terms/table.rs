@@ -65,9 +65,14 @@ macro_rules! joint_terms {
                 match self { $($(Self::$term { .. } => $term::PRIOR_SIGMA,)+)+ }
             }
 
-            /// The smallest robot model that has such terms; larger ones have them, too.
+            /// The smallest robot model that has such terms of every joint; larger ones have them, too.
             pub(in crate::model) fn model(self) -> RobotModel {
                 match self { $($(Self::$term { .. } => $term::MODEL,)+)+ }
+            }
+
+            /// The same for joints that carry the arm ([`Chain::carries_arm`]).
+            pub(in crate::model) fn model_of_arm(self) -> RobotModel {
+                match self { $($(Self::$term { .. } => $term::MODEL_OF_ARM,)+)+ }
             }
 
             /// Value of the basis function.
@@ -203,7 +208,7 @@ impl TermSizes {
     pub const NONE: Self = Self([0.0; TermKind::ALL.len()]);
 
     fn of_model(model: RobotModel, size: impl Fn(Term) -> f64) -> Self {
-        let terms = Term::all(1).into_iter().filter(|t| t.model() <= model);
+        let terms = Term::all(1).into_iter().filter(|t| model.contains(t.model()));
         terms.fold(Self::NONE, |sizes, t| sizes.with(t.kind(), size(t)))
     }
 

@@ -20,7 +20,7 @@ pub fn other_frame(base: &str, (fit, name): (&FrameFit, &str), limits: &Limits, 
         1e3 * m,
         rad.to_degrees()
     );
-    let is_other = m > limits.same_tool_m || rad > limits.same_work_rad;
+    let is_other = m > limits.same_base_m || rad > limits.same_work_rad;
     let quantities = [("distance_mm", 1e3 * m), ("angle_deg", rad.to_degrees())];
     is_other.then(|| FileFinding::new(Code::FramesDiffer, Weight::Gate, subject, quantities, text))
 }

@@ -304,7 +304,7 @@ fn line(finding: &impl Serialize) -> Result<String> {
 /// One row for every target: what the correction is, or why there is none.
 pub fn table(program: &Program, done: &Compensated, expected: Option<&[Option<f64>]>, chain: &Chain) -> String {
     let mut out = String::from(
-        "file,line,target,correction_mm,correction_mrad,largest_joint_change,joint,rounding_m,rounding_rad,left_because,posture,expected_mm,taught_mm,reason\n",
+        "file,line,target,correction_mm,correction_mrad,largest_joint_change,joint,joint_unit,rounding_m,rounding_rad,left_because,posture,expected_mm,taught_mm,reason\n",
     );
     let cell = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     let millimetres = |m: Option<f64>| m.map_or_else(String::new, |m| format!("{:.4}", 1e3 * m));
@@ -317,21 +317,22 @@ pub fn table(program: &Program, done: &Compensated, expected: Option<&[Option<f6
             TargetOutcome::Done(c) => {
                 let (joint, change) = c.largest_change();
                 let (mm, mrad) = (1e3 * c.shift_m, 1e3 * c.turn_rad);
-                let (name, rest_m, rest_rad) = (cell(&chain.readings[joint]), c.residual_m, c.residual_rad);
+                let (name, unit) = (cell(&chain.readings[joint]), chain.reading_kinds[joint].units()[0]);
+                let (rest_m, rest_rad) = (c.residual_m, c.residual_rad);
                 let posture = c.posture.word();
                 writeln!(
                     out,
-                    "{head},{mm:.4},{mrad:.4},{change:.9},{name},{rest_m:.2e},{rest_rad:.2e},,{posture},{expected},{taught},"
+                    "{head},{mm:.4},{mrad:.4},{change:.9},{name},{unit},{rest_m:.2e},{rest_rad:.2e},,{posture},{expected},{taught},"
                 )
             }
             TargetOutcome::Left(why) => {
-                writeln!(out, "{head},,,,,,,{},,,{taught},{}", cell(&why.words), why.reason.name())
+                writeln!(out, "{head},,,,,,,,{},,,{taught},{}", cell(&why.words), why.reason.name())
             }
         };
     }
     for l in &program.left {
         let (file, name) = (cell(&program.files[l.file].name), cell(&l.name));
-        let _ = writeln!(out, "{file},{},{name},,,,,,,{},,,,{}", l.line, cell(&l.why.words), l.why.reason.name());
+        let _ = writeln!(out, "{file},{},{name},,,,,,,,{},,,,{}", l.line, cell(&l.why.words), l.why.reason.name());
     }
     out
 }

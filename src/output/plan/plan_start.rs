@@ -132,10 +132,12 @@ fn stops(used: &[&ImageRecord], columns: &Columns, record: &SolutionRecord) -> V
 /// The smallest robot model that has all joint terms of a solution.
 pub fn model_of(record: &SolutionRecord, chain: &Chain) -> RobotModel {
     let has_all = |model: &RobotModel| {
-        let names: BTreeSet<String> = model.robot(chain.clone()).terms.iter().map(|t| t.term.name()).collect();
-        record.robot.terms.iter().all(|t| names.contains(&t.term))
+        let terms = model.robot(chain.clone()).terms.into_iter();
+        let of_model: BTreeSet<(&str, String)> =
+            terms.map(|t| (chain.readings[t.reading].as_str(), t.term.name())).collect();
+        record.robot.terms.iter().all(|t| of_model.contains(&(t.reading.as_str(), t.term.clone())))
     };
-    [RobotModel::Rigid, RobotModel::Gear].into_iter().find(has_all).unwrap_or(RobotModel::Full)
+    RobotModel::CHOICES.into_iter().find(has_all).unwrap_or(RobotModel::Full)
 }
 
 /// The robot with the twists and terms of the solution; terms of the model that it has not stand at zero.
