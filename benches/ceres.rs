@@ -146,6 +146,7 @@ fn read(folder: &Path, mode: Mode) -> Fallible<Adjustment> {
         lengths: Vec::new(),
         noise,
         families: Vec::new(),
+        moved_markers: std::collections::BTreeSet::new(),
         restraint: None,
         huber: f64::INFINITY,
         bounds: robotcal::assess::Limits::default().bounds(),

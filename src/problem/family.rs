@@ -9,6 +9,9 @@ use crate::model::robot::Robot;
 /// Sigma with which directions of a family are held at zero, as a share of its base sigma: far below anything that counts.
 const HELD: f64 = 1e-4;
 
+/// Smallest factor of a family: with it, its parameters are as good as left out.
+const SMALLEST_FACTOR: f64 = 1e-3;
+
 /// Weight, in parameters, with which the size of twists is drawn to what is stated: a scaled inverse chi-squared prior with so many
 /// degrees of freedom has 95 % of the factor between 1/2 and 2 (`1.96 / sqrt(2 n) = ln 2`).
 const TWISTS_DRAWN: f64 = 4.0;
@@ -35,6 +38,8 @@ pub struct Family {
     pub factor: f64,
     /// Weight, in parameters, with which the factor is drawn to 1; 0 leaves it to the data alone.
     pub drawn: f64,
+    /// The smallest factor.
+    pub least: f64,
     /// Directions that are held at zero because other parameters say the same: orthonormal, one row per column of the family.
     pub held: DMatrix<f64>,
 }
@@ -56,12 +61,13 @@ impl Family {
         (!columns.is_empty()).then(|| Self { drawn: TWISTS_DRAWN, ..Self::new(TWISTS, layout, columns) })
     }
 
-    /// Sag of the joints where masses are not known and whose priors nobody has stated; `None` without.
+    /// Sag of the joints where masses are not known and whose priors nobody has stated; `None` without. It may be more than what is usual, and not less:
+    /// few stops tell little of an arm that sags little.
     pub fn of_gravity(layout: &Layout, robot: &Robot, is_stated: impl Fn(usize) -> bool) -> Option<Self> {
         let terms = layout.terms.clone().zip(&robot.terms);
         let of_gravity = terms.filter(|(c, t)| matches!(t.term, Term::Gravity { .. }) && !is_stated(*c));
         let columns: Vec<usize> = of_gravity.map(|(c, _)| c).collect();
-        (!columns.is_empty()).then(|| Self { drawn: GRAVITY_DRAWN, ..Self::new(GRAVITY, layout, columns) })
+        (!columns.is_empty()).then(|| Self { drawn: GRAVITY_DRAWN, least: 1.0, ..Self::new(GRAVITY, layout, columns) })
     }
 
     /// True for the family of the twists.
@@ -71,13 +77,21 @@ impl Family {
 
     /// The factor that sums of squares and the number of determined parameters ask for.
     pub fn asked(&self, squares: f64, determined: f64) -> f64 {
-        ((squares + self.drawn) / (determined + self.drawn)).sqrt()
+        ((squares + self.drawn) / (determined + self.drawn)).sqrt().max(self.least)
     }
 
     /// A family of columns at their present priors.
     pub fn new(name: &str, layout: &Layout, columns: Vec<usize>) -> Self {
         let base = columns.iter().map(|&c| layout.columns[c].prior_sigma).collect();
-        Self { name: name.into(), held: DMatrix::zeros(columns.len(), 0), columns, base, factor: 1.0, drawn: 0.0 }
+        Self {
+            name: name.into(),
+            held: DMatrix::zeros(columns.len(), 0),
+            columns,
+            base,
+            factor: 1.0,
+            drawn: 0.0,
+            least: SMALLEST_FACTOR,
+        }
     }
 
     /// Takes the factor of the family of the same name, where there is one.

@@ -137,3 +137,28 @@ fn sag_of_the_joints_that_carry_the_arm_is_taken_for_no_gear() {
     let ratio = (squares(|both| both.0) / squares(|both| both.1)).sqrt();
     assert!(ratio < 1.5, "{all:?}");
 }
+
+/// Of an arm that does not sag, of one that sags as usual, and of one that sags ten times as much: what is stated of the flange covers its error.
+#[test]
+fn how_much_an_arm_sags_is_told_by_the_robot_itself() {
+    for (times, low, high) in [(0.0, 1.0, 1.01), (1.0, 1.0, 1.6), (10.0, 4.0, 16.0)] {
+        for seed in 1..=2 {
+            let errors = RobotErrors::full().with(TermKind::Gravity, times * 0.3e-3);
+            let world = world(errors, seed);
+            let options = Options { model: RobotModel::Full, ..Options::default() };
+            let s = identify(kr6(), &[measured(&world, &kr6())], &options).unwrap();
+            let factor = s.fit.problem.families.iter().find(|f| f.name == "gravity").unwrap().factor;
+            let poses: Vec<(Vec<f64>, Pose)> =
+                world.truth.held_out.iter().map(|h| (h.readings.clone(), h.base_from_tip.pose())).collect();
+            let error_m = flange_error_m(&s.fit.state.robot, &s.fit.state.placements[0], &poses).unwrap();
+            let stated_m = s.uncertainty.flange.unwrap().model_m;
+            println!(
+                "{times} times, seed {seed}: factor {factor:.3}, {:.4} of {:.4} mm",
+                1e3 * error_m,
+                1e3 * stated_m
+            );
+            assert!((low..high).contains(&factor), "{times} times as made, {factor} as found");
+            assert!(error_m < 2.0 * stated_m, "{error_m} m, and {stated_m} are stated");
+        }
+    }
+}

@@ -41,9 +41,6 @@ pub const LEAST_FIRST_GUESS: f64 = 10.0 * JOINT_NOISE_FLOOR;
 /// Relative change of every component below which the rounds end.
 const CONVERGED: f64 = 0.01;
 
-/// Smallest factor of a family: with it, its parameters are as good as left out.
-const SMALLEST_FACTOR: f64 = 1e-3;
-
 /// Determined parameters of a family below which its factor stays.
 const FEWEST_DETERMINED: f64 = 1e-6;
 
@@ -182,7 +179,7 @@ fn components(problem: &mut Problem) -> impl Iterator<Item = (&mut f64, f64)> {
     let factors =
         pixel_factor.iter_mut().chain(marker).chain(body.iter_mut().flatten()).map(|s| (s, f64::MIN_POSITIVE));
     let sizes = joint.iter_mut().flatten().chain(local).chain(displacement).map(|s| (s, JOINT_NOISE_FLOOR));
-    let families = problem.families.iter_mut().map(|f| (&mut f.factor, SMALLEST_FACTOR));
+    let families = problem.families.iter_mut().map(|f| (&mut f.factor, f.least));
     factors.chain(sizes).chain(families).filter(|(s, _)| **s > 0.0)
 }
 
@@ -282,8 +279,8 @@ impl Fit {
             if determined < FEWEST_DETERMINED {
                 continue;
             }
-            let next = family.asked(squares, determined).clamp(SMALLEST_FACTOR, 2.0 * family.factor);
-            if next > SMALLEST_FACTOR {
+            let next = family.asked(squares, determined).min(2.0 * family.factor);
+            if next > family.least {
                 change = change.max((next / family.factor - 1.0).abs());
             }
             family.factor = next;
