@@ -43,11 +43,13 @@ impl Detection {
     /// Columns and rows of the plate that the markers span which were found.
     pub(super) fn span(&self, plate: &Plate) -> [u32; 2] {
         let columns = plate.columns.max(1);
+        let found: Vec<u32> =
+            self.observations.iter().filter_map(|o| plate.index_of(o.marker)).map(|k| k as u32).collect();
         let range = |place: fn(u32, u32) -> u32| {
-            let all = self.observations.iter().map(|o| place(o.marker, columns));
+            let all = found.iter().map(|k| place(*k, columns));
             all.clone().max().zip(all.min()).map_or(0, |(last, first)| last - first + 1)
         };
-        [range(|id, columns| id % columns), range(|id, columns| id / columns)]
+        [range(|k, columns| k % columns), range(|k, columns| k / columns)]
     }
 
     /// A board with a code that goes on where it should end.

@@ -1,6 +1,6 @@
 //! Detection over the images of a series.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -161,26 +161,32 @@ fn bytes_of(path: &Path) -> u64 {
     picture_size(path).map_or(0, |(w, h)| BYTES_PER_PX * u64::from(w) * u64::from(h))
 }
 
-/// The dots that are larger tell how a grid is turned: images that show others than most, or none of them, have ids that nobody can trust. That there
-/// are none, an image says which shows all dots; others may not show the larger ones.
+/// The dots that are larger tell how a grid is turned: images that show others than most, or none of them, have ids that nobody can trust. Larger dots
+/// that fewer images show than there are which show all dots in these places alike are none: a speck, or two dots that ran into each other.
 fn refuse_odd_dots(images: &[PathBuf], plate: &Plate, found: &mut [SeriesImage]) {
     let large = |i: &SeriesImage| {
         let sizes = i.detection.circles.as_ref().filter(|_| i.detection.failure.is_none()).map(|c| &c.sizes);
         sizes.filter(|s| !s.radii_m.is_empty()).map(|s| s.large.clone())
     };
-    let says = |i: &SeriesImage| {
-        large(i).filter(|seen| !seen.is_empty() || i.detection.observations.len() == plate.markers.len())
-    };
     let mut counts: BTreeMap<Vec<u32>, usize> = BTreeMap::new();
-    for seen in found.iter().filter_map(says) {
+    for seen in found.iter().filter_map(large).filter(|seen| !seen.is_empty()) {
         *counts.entry(seen).or_default() += 1;
     }
-    let Some((usual, count)) = counts.into_iter().max_by_key(|(_, count)| *count) else { return };
+    let Some((most, count)) = counts.into_iter().max_by_key(|(_, count)| *count) else { return };
+    let places = in_all_turns(plate, &most);
+    let shows_none = |i: &SeriesImage| {
+        let seen: BTreeSet<u32> = i.detection.observations.iter().map(|o| o.marker).collect();
+        large(i).is_some_and(|large| large.is_empty()) && places.is_subset(&seen)
+    };
+    let without = found.iter().filter(|i| shows_none(i)).count();
+    let (usual, most_are) = if without < count { (most, count) } else { (Vec::new(), without) };
     for (path, image) in images.iter().zip(found) {
         let Some(seen) = large(image).filter(|seen| *seen != usual) else { continue };
-        let what = match seen.is_empty() {
-            true => format!("shows none of the larger dots that {count} images show: its ids cannot be told"),
-            false => format!("the larger dots are not those that {count} images show: its ids cannot be told"),
+        let of_others = format!("of {most_are} other images");
+        let what = match (seen.is_empty(), usual.is_empty()) {
+            (true, _) => format!("shows none of the larger dots {of_others}: its ids cannot be told"),
+            (false, true) => format!("dots are larger that are not so in {most_are} images: its ids cannot be told"),
+            (false, false) => format!("the larger dots are not those {of_others}: its ids cannot be told"),
         };
         let remedy =
             "take the image so that all larger dots are seen, or state them in plate.toml: large = [[column, row], ..]";
@@ -188,6 +194,12 @@ fn refuse_odd_dots(images: &[PathBuf], plate: &Plate, found: &mut [SeriesImage])
         image.detection.notices.retain(|notice| notice.code != Code::PlateSymmetric);
         image.detection.failure = Some(Error::new(Code::PlateIncomplete, path.display(), what, remedy));
     }
+}
+
+/// Places of dots, however the grid is turned.
+fn in_all_turns(plate: &Plate, dots: &[u32]) -> BTreeSet<u32> {
+    let turned = plate.turns().into_iter().flat_map(|turn| dots.iter().map(move |id| turn.id(*id)).collect::<Vec<_>>());
+    dots.iter().copied().chain(turned).collect()
 }
 
 /// A line of a board that is missing in view may be covered only where another image shows the whole board: else the board is not as large

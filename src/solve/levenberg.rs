@@ -62,6 +62,12 @@ impl Outcome {
         Some(self.adjustment.linear(self.linearised.as_ref()?))
     }
 
+    /// The adjustment linearised at its optimum; `None` where it came to no end.
+    pub fn linearised_adjustment(self) -> Option<LinearisedAdjustment> {
+        let Self { status: Status::Converged, adjustment, linearised, .. } = self else { return None };
+        Some(LinearisedAdjustment { adjustment, linearised: linearised?, system: None })
+    }
+
     /// How it ended, with its fit.
     pub fn ended(self) -> Ended {
         Ended { status: self.status, iterations: self.iterations, fit: self.fit() }

@@ -20,12 +20,7 @@ impl LinearisedAdjustment {
     /// `None` where a marker lies behind its camera.
     pub fn of(adjustment: Adjustment) -> Option<Self> {
         let linearised = adjustment.linearise()?;
-        Some(Self::new(adjustment, linearised))
-    }
-
-    /// With the linearisation where it stands.
-    pub fn new(adjustment: Adjustment, linearised: Linearised) -> Self {
-        Self { adjustment, linearised, system: None }
+        Some(Self { adjustment, linearised, system: None })
     }
 
     /// The linear problem.
@@ -59,6 +54,6 @@ impl LinearProblem<'_> {
 
     fn left_in(self, adjustment: Adjustment) -> LinearisedAdjustment {
         let linearised = adjustment.left_of(self.lin);
-        LinearisedAdjustment::new(adjustment, linearised)
+        LinearisedAdjustment { adjustment, linearised, system: None }
     }
 }

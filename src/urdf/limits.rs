@@ -34,7 +34,7 @@ impl Chain {
         limits.map(|(limits, kind)| limits.unwrap_or((-widest(kind), widest(kind)))).collect()
     }
 
-    /// Ranges of all readings in which the arm takes every posture that it has, rad or m: of a joint that turns farther a turn, about zero where it can.
+    /// Ranges of all readings in which the arm takes every posture that it has, rad or m: of a joint that turns farther a turn, that about zero where it can.
     pub fn ranges(&self) -> Vec<(f64, f64)> {
         let limits = self.limits_or(UNLIMITED_M).into_iter().zip(&self.reading_kinds);
         limits.map(|(limits, kind)| kind.inner_turn(limits)).collect()
@@ -42,13 +42,13 @@ impl Chain {
 }
 
 impl JointKind {
-    /// The turn of a wider range that is nearest to the one about zero; the whole of another, and of a slide.
+    /// What of a range is within a turn: from half a turn before zero on, or, where all of it lies before zero, up to its end; the whole of a slide.
     pub fn inner_turn(self, (low, high): (f64, f64)) -> (f64, f64) {
-        if self == Self::Prismatic || high - low <= TAU {
+        if self == Self::Prismatic {
             return (low, high);
         }
-        let from = (-PI).clamp(low, high - TAU);
-        (from, from + TAU)
+        let from = if high <= 0.0 { low.max(high - TAU) } else { low.max(-PI) };
+        (from, high.min(from + TAU))
     }
 }
 

@@ -364,6 +364,28 @@ fn images_that_cannot_show_the_larger_dot_do_not_outvote_those_that_do() {
     assert!(seen[2..].iter().all(|i| i.detection.failure.as_ref().is_some_and(|f| f.code == Code::PlateIncomplete)));
 }
 
+/// A speck on one image of a grid of equal dots is no larger dot, whether the others show all dots or not.
+#[test]
+fn a_dot_that_is_larger_in_one_image_alone_refuses_that_image() {
+    let stated = grid("columns = 8\nrows = 6");
+    let paths: Vec<_> = (0..5).map(|seed| Path::new(&format!("{seed}.png")).to_path_buf()).collect();
+    for covered in [None, Some(10)] {
+        let picture = |seed: u64| {
+            let mut plate = printed(&stated, if seed == 4 { &[20] } else { &[] }, &[]);
+            if let Some(covered) = covered {
+                plate.markers[covered].outer_radius_m = 0.0;
+            }
+            let view = view(&mut ChaCha8Rng::seed_from_u64(seed), Spoiling::None);
+            Scene { plate, camera_from_plate: pose(&view), ..scene(&view) }.render(seed)
+        };
+        let number = |path: &Path| path.file_stem().unwrap().to_str().unwrap().parse().unwrap();
+        let seen = detect_series(&paths, &stated, |path| Ok(picture(number(path))), |_| {});
+        let counts: Vec<usize> = seen.iter().map(|i| i.detection.observations.len()).collect();
+        let whole = 48 - usize::from(covered.is_some());
+        assert_eq!(counts, [whole, whole, whole, whole, 0]);
+    }
+}
+
 /// The larger dot is not where plate.toml says: the outline leaves the turn open, and nothing settles it.
 #[test]
 fn a_larger_dot_in_another_place_than_stated_is_named() {

@@ -113,7 +113,7 @@ fn other_lenses_are_asked_where_the_residuals_show_a_pattern() {
 /// The simplest lens does not explain the images of a wide angle: the fit does not begin with it.
 #[test]
 fn a_wide_angle_begins_with_the_lens_that_explains_it() {
-    let s = found(&world(Lens::Fisheye, 120.0), Lens::Brown, LensChoice::All);
+    let s = found(&world(Lens::Fisheye, 160.0), Lens::Brown, LensChoice::All);
     println!("{:?}", s.lenses);
     assert_eq!(s.fit.state.cameras[0].lens, Lens::Fisheye);
     assert!(s.lenses.iter().all(|l| l.lens.formula() == Lens::Fisheye), "no pattern asks for another");

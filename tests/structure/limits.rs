@@ -129,6 +129,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/controller/computed_postures.rs STARTS", "starts of a search"),
     ("identify/controller/computed_postures.rs TURNS", "most iterations"),
     ("identify/controller/computed_postures.rs WIDTH", "width of a search"),
+    ("diagnose/mistake.rs HALF_TURN_DEG", "half a turn"),
     ("identify/controller/computed_postures.rs WIDTH_FITTED", "width of a search"),
     ("identify/controller/tool.rs DIFFERENCE", "step of a difference quotient"),
     ("identify/controller/tool.rs GAINED", "end of a search"),

@@ -30,8 +30,9 @@ pub(in crate::identify) fn likeliest(
     };
     let fewest = |a: &usize, b: &usize| joints(&tried[*a].1).cmp(&joints(&tried[*b].1)).then(by_left(a, b));
     let named = (0..tried.len()).filter(is_alike).min_by(fewest).unwrap_or(best);
-    let kind = with_sign_or_zero(tried, named, limits);
-    Some((named, kind.unwrap_or_else(|| with_mirror_image(tried, named, robot, limits))))
+    let kind = with_mirror_image(tried, named, robot, limits);
+    let is_as_tried = kind == tried[named].1;
+    Some((named, with_sign_or_zero(tried, named, limits).filter(|_| is_as_tried).unwrap_or(kind)))
 }
 
 /// How many joints it is about, where fewer may fit alike.
@@ -49,7 +50,7 @@ fn alike<'t>(tried: &'t [Explained], named: usize, limits: &Limits) -> impl Iter
 }
 
 /// Where a wrong sign and a zero half a turn off fit alike, both.
-fn with_sign_or_zero(tried: &[Explained], named: usize, limits: &Limits) -> Option<MistakeKind> {
+pub(super) fn with_sign_or_zero(tried: &[Explained], named: usize, limits: &Limits) -> Option<MistakeKind> {
     let zero = |kind: &MistakeKind| match kind {
         MistakeKind::Zero { joint, lacking_deg } if *lacking_deg == HALF_TURN_DEG => Some(joint.clone()),
         _ => None,

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
+use super::likeliest::{Explained, with_sign_or_zero};
 use super::name_order::in_other_orders;
 use super::readings::{Undone, mistakes_undone, shifted_rows, signs_of_others};
 use crate::assess::Limits;
@@ -77,8 +78,11 @@ impl Suspects<'_> {
             .filter(|undone| !is_partly(&undone.1) && !self.are_reversed_arms(undone))
             .map(|(readings, mistake)| (self.misfit(&readings), mistake))
             .collect();
-        let all = tried.into_iter().chain(partly.iter().cloned()).chain([self.wrong_mount(), self.mirrored()]);
-        all.min_by(|a, b| a.0.total_cmp(&b.0))
+        let others = [self.wrong_mount(), self.mirrored()];
+        let all: Vec<Explained> = tried.into_iter().chain(partly.iter().cloned()).chain(others).collect();
+        let best = (0..all.len()).min_by(|a, b| all[*a].0.total_cmp(&all[*b].0))?;
+        let (left, kind) = &all[best];
+        Some((*left, with_sign_or_zero(&all, best, self.limits).unwrap_or_else(|| kind.clone())))
     }
 
     /// Poses of a controller with a mistake undone, the best of them.

@@ -66,9 +66,7 @@ impl PoseStage {
 
     /// The free-pose adjustment of all observations in use, with the pixel noise that `start` has.
     pub fn solved(start: &Adjustment) -> Option<LinearisedAdjustment> {
-        let outcome = solve_near(with_free_poses(start)?, &AT_POSES);
-        let linearised = outcome.linearised.filter(|_| outcome.status == Status::Converged)?;
-        Some(LinearisedAdjustment::new(outcome.adjustment, linearised))
+        solve_near(with_free_poses(start)?, &AT_POSES).linearised_adjustment()
     }
 
     /// Of the images that are `left` of those of a solved free-pose adjustment: one step from there. Images have nothing but cameras and plates
