@@ -111,8 +111,7 @@ fn flange(r: &SolutionRecord) -> Vec<String> {
     let i = e.intervals.as_ref();
     let (alone_m, of_alone) = e.best_urdf_m();
     let at = if r.has_no_robot() { r.flange_holds() } else { "in the range of the stops" };
-    let held = if r.hangs_on_a_stated_size() { ", if the plate has its stated size" } else { "" };
-    let mut lines = vec![format!("accuracy  expected flange error {at}, RMS{told}{held}:")];
+    let mut lines = vec![format!("accuracy  expected flange error {at}, RMS{told}:")];
     if r.has_no_robot() {
         lines.push(row("poses of the controller", alone_m, of_alone));
     } else {
@@ -229,7 +228,7 @@ fn next(r: &SolutionRecord, verdict: &Verdict, most: usize) -> Vec<String> {
 const ENTER_MASTERING: &str = "enter in the controller the offsets of mastering.csv with in_urdf = no";
 
 /// Where its size stands in its file alone.
-const MEASURE_THE_PLATE: &str = "measure the plate ([scale]): 0.1 % off its stated size is 1 mm a metre";
+const MEASURE_THE_PLATE: &str = "measure the plate ([scale]): 0.1 % off adds 1 mm a metre to the above";
 
 /// A stop to add, in a line.
 fn advice(r: &SolutionRecord, a: &Advice) -> String {
