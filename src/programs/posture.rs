@@ -170,19 +170,12 @@ fn by_either(coded: Understood<Posture>, way: Understood<Posture>) -> Understood
     }
 }
 
-/// The way there must not lead to another posture than that of codes which count for nothing on it.
-fn by_way(coded: Understood<Posture>, way: Option<Posture>, codes: &Codes) -> Understood<Posture> {
-    match (coded, way) {
-        (Ok((coded, _)), Some((way, _))) if farthest(&coded, &way) > SAME_READING => {
-            let words = format!(
-                "its posture is not known: the way there leads to another one than {}, which no path of the tool heeds (--nearest-posture heeds no codes)",
-                codes.shown()
-            );
-            Err(Why::new(LeftReason::PostureUnknown, words))
-        }
-        (Err(_), Some(way)) => Ok(way),
-        (coded, _) => coded,
-    }
+fn leads_elsewhere(codes: &Codes) -> Why {
+    let words = format!(
+        "its posture is not known: the way there leads to another one than {}, which no path of the tool heeds (--nearest-posture heeds no codes)",
+        codes.shown()
+    );
+    Why::new(LeftReason::PostureUnknown, words)
 }
 
 fn contradicted() -> Why {
@@ -227,8 +220,20 @@ impl<'a> Finder<'a> {
                 by_either(coded, self.by_approach(pose, held, before, *way))
             }
             (MeantPosture::Unheeded(codes, axes, way), _) => {
-                let by_tool = before.readings.filter(|_| before.straight).map(|q| self.by_tool(pose, held, q, *way));
-                by_way(self.by_codes(pose, held, before, (codes, axes)), by_tool.and_then(Result::ok), codes)
+                let coded = self.by_codes(pose, held, before, (codes, axes));
+                let Some(q) = before.readings.filter(|_| before.straight) else { return coded };
+                match (coded, self.by_tool(pose, held, q, *way)) {
+                    (Ok((coded, _)), Ok((by_tool, _))) if farthest(&coded, &by_tool) > SAME_READING => {
+                        Err(leads_elsewhere(codes))
+                    }
+                    (Ok((coded, _)), Err(_))
+                        if *way == Way::Path && self.parts(&Self::fixed(pose, q), &coded, held) =>
+                    {
+                        Err(leads_elsewhere(codes))
+                    }
+                    (Err(_), Ok(by_tool)) => Ok(by_tool),
+                    (coded, _) => coded,
+                }
             }
             (MeantPosture::Near(q), _) => {
                 let found = self.near(pose, held, q, Choice::Clear)?;
@@ -279,24 +284,26 @@ impl<'a> Finder<'a> {
         q.iter().zip(&pose.fixed).map(|(q, f)| f.unwrap_or(*q)).collect()
     }
 
+    /// True where a singular posture lies between a place and a posture: a path of the tool does not pass it. From a singular one it leads to either side.
+    fn parts(&self, place: &[f64], found: &[f64], held: &[bool]) -> bool {
+        smallest_singular_value(self.robot, place, held) >= SINGULAR && is_parted(self.robot, place, found, held)
+    }
+
     /// The solution next to `q` of those that will do.
     fn near(&mut self, pose: &PoseTarget, held: &[bool], q: &[f64], choice: Choice) -> Understood<Vec<f64>> {
         let (wanted, near) = (pose.base_from_flange(), Self::fixed(pose, q));
-        let robot = self.robot;
-        // From a singular posture a path leads to either side.
-        let is_filtered = choice == Choice::Unparted && smallest_singular_value(robot, &near, held) >= SINGULAR;
-        let will_do = |found: &[f64]| !is_filtered || !is_parted(robot, &near, found, held);
+        let will_do = |found: &[f64]| choice != Choice::Unparted || !self.parts(&near, found, held);
         if let Some(found) = self.solved(&wanted, &near, &near, held, None)
             && farthest(&near, &found) < NEAR
             && will_do(&found)
         {
             return Ok(found);
         }
-        let all = self.postures(&wanted, &near, held);
+        let mut all = self.postures(&wanted, &near, held);
         if all.is_empty() {
             return Err(unreached(""));
         }
-        let all: Vec<Vec<f64>> = all.into_iter().filter(|found| will_do(found)).collect();
+        all.retain(|found| choice != Choice::Unparted || !self.parts(&near, found, held));
         let Some(best) = all.first() else { return Err(path_not_followed()) };
         let redundant = held.iter().filter(|h| !**h).count() > 6;
         let second = all.get(1).filter(|_| choice != Choice::Nearest && !redundant);

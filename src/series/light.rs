@@ -20,12 +20,16 @@ impl Light {
     /// Those in dark/ and white/ of the first folder that has them.
     pub fn of(folders: &[&Path]) -> Result<Self> {
         let optional = |name: &str| {
-            let there = folders.iter().map(|folder| folder.join(name)).find(|path| path.is_dir());
+            let there = folders.iter().map(|folder| folder.join(name)).find(|path| holds_images(path));
             there.map_or_else(|| Ok(Vec::new()), |path| image_files(&path))
         };
         let [dark, white] = NAMES.map(optional);
         Ok(Self { dark: dark?, white: white? })
     }
+}
+
+fn holds_images(path: &Path) -> bool {
+    path.is_dir() && image_files(path).map_or(true, |files| !files.is_empty())
 }
 
 /// Folders that may hold those of a camera whose images lie in `images`: this one and the one above it, unless others have them, too, and that
@@ -53,7 +57,6 @@ pub(super) fn unused_light(series: &Series, of_all: &[PathBuf], views: &[Series]
         views.iter().any(of_view)
     };
     let there = folders.into_iter().flat_map(|folder| NAMES.map(|name| folder.join(name)));
-    let holds_images = |path: &Path| path.is_dir() && image_files(path).map_or(true, |files| !files.is_empty());
     let unused = there.filter(|path| holds_images(path) && !is_used(path));
     let (what, remedy) = match of_all.len() {
         1 => (
