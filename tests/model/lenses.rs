@@ -5,16 +5,22 @@ use robotcal::assess::Limits;
 use robotcal::identify::{Options, RobotModel, Solution, choose_lens, depths_m, identify};
 use robotcal::model::camera::{Camera, Lens, fit_lens};
 use robotcal::plan::plate_design::{PlateRequest, design};
+use robotcal::plan::viewpoint::ViewRange;
 use robotcal::problem::{Adjustment, LensChoice};
 use robotcal::simulate::{SimulatedSeries, WorldRequest, lens_camera, series};
 use robotcal::study::measured;
 
 fn world(lens: Lens, field_deg: f64) -> SimulatedSeries {
+    seen_from(lens, field_deg, 10, ViewRange::default())
+}
+
+fn seen_from(lens: Lens, field_deg: f64, images: usize, views: ViewRange) -> SimulatedSeries {
     let plate = design(&PlateRequest { markers: Some(120), ..PlateRequest::default() }).unwrap().plate;
     let request = WorldRequest {
         camera: lens_camera(lens, 1280, 1024, field_deg.to_radians()),
-        images: 10,
+        images,
         held_out: 2,
+        views,
         seed: 7,
         ..WorldRequest::typical(ur10e(), plate)
     };
@@ -113,7 +119,9 @@ fn other_lenses_are_asked_where_the_residuals_show_a_pattern() {
 /// The simplest lens does not explain the images of a wide angle: the fit does not begin with it.
 #[test]
 fn a_wide_angle_begins_with_the_lens_that_explains_it() {
-    let s = found(&world(Lens::Fisheye, 160.0), Lens::Brown, LensChoice::All);
+    // The plate fills the image.
+    let near = ViewRange { near_m: 0.08, far_m: 0.15, aside_rad: 0.4, ..ViewRange::default() };
+    let s = found(&seen_from(Lens::Fisheye, 150.0, 24, near), Lens::Brown, LensChoice::All);
     println!("{:?}", s.lenses);
     assert_eq!(s.fit.state.cameras[0].lens, Lens::Fisheye);
     assert!(s.lenses.iter().all(|l| l.lens.formula() == Lens::Fisheye), "no pattern asks for another");
