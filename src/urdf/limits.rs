@@ -74,7 +74,7 @@ mod tests {
         assert_eq!(chain.ranges(), [(1.0, 5.0), (4.0, 6.0), (-PI, PI), (-0.5, 1.0)]);
         assert_eq!(JointKind::Revolute.inner_turn((-20.0, -1.0)), (-1.0 - TAU, -1.0));
         // A turntable from zero on, and a wrist (Panda) that is not centred.
-        for whole in [(0.0, 6.28), (-0.0175, 3.7525)] {
+        for whole in [(0.0, TAU), (-0.0175, 3.7525)] {
             assert_eq!(JointKind::Revolute.inner_turn(whole), whole);
         }
     }
