@@ -29,6 +29,8 @@ pub enum MistakeKind {
         joints: Vec<String>,
         /// The joint of the zero.
         zero: String,
+        /// Degrees that its readings lack.
+        lacking_deg: f64,
     },
     /// The axes of an instrument are left-handed, or the readings of these joints have the wrong sign: the arm is its mirror image.
     MirrorImage {
@@ -362,8 +364,8 @@ impl Kind for Mistake {
                 format!("{}: if it does not, {}; else {}", turned_by_hand(others), signs_changed(others), signs_changed(joints))
             }
             MistakeKind::Zero { joint, lacking_deg } => zero_changed(joint, *lacking_deg),
-            MistakeKind::SignsOrZero { joints, zero } => {
-                format!("{}: if it does, {}; else {}", turned_by_hand(joints), zero_changed(zero, HALF_TURN_DEG), signs_changed(joints))
+            MistakeKind::SignsOrZero { joints, zero, lacking_deg } => {
+                format!("{}: if it does, {}; else {}", turned_by_hand(joints), zero_changed(zero, *lacking_deg), signs_changed(joints))
             }
             MistakeKind::MirrorImage { joints, axes } => {
                 format!("{}: if it does, {axes}; else {}", turned_by_hand(joints), signs_changed(joints))
@@ -460,8 +462,8 @@ impl Mistake {
             MistakeKind::Zero { joint, lacking_deg } => format!(
                 "the zero of {joint} is not that of the URDF: with {lacking_deg} deg added to its readings the {noun}s fit"
             ),
-            MistakeKind::SignsOrZero { joints, zero } => format!(
-                "{}; with {HALF_TURN_DEG} deg added to those of {zero} they fit alike, and do not tell which",
+            MistakeKind::SignsOrZero { joints, zero, lacking_deg } => format!(
+                "{}; with {lacking_deg} deg added to those of {zero} they fit alike, and do not tell which",
                 signs_wrong(joints, noun)
             ),
             MistakeKind::MirrorImage { joints, .. } => format!(

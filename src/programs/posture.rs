@@ -153,6 +153,11 @@ pub(super) fn is_parted(robot: &Robot, from: &[f64], to: &[f64], held: &[bool]) 
     (1..=BETWEEN).any(|k| sign(k) != first)
 }
 
+/// True where a path of the tool, which passes no singular posture, leads from a place to a posture. From a singular one it leads to either side.
+fn path_leads(robot: &Robot, place: &[f64], found: &[f64], held: &[bool]) -> bool {
+    smallest_singular_value(robot, place, held) < SINGULAR || !is_parted(robot, place, found, held)
+}
+
 fn unreached(posture: &str) -> Why {
     let remedy = "look at the base and tip link, and at tool and work frame";
     Why::new(LeftReason::OutOfReach, format!("the controller's model does not reach this pose{posture} ({remedy})"))
@@ -227,7 +232,7 @@ impl<'a> Finder<'a> {
                         Err(leads_elsewhere(codes))
                     }
                     (Ok((coded, _)), Err(_))
-                        if *way == Way::Path && self.parts(&Self::fixed(pose, q), &coded, held) =>
+                        if *way == Way::Path && !path_leads(self.robot, &Self::fixed(pose, q), &coded, held) =>
                     {
                         Err(leads_elsewhere(codes))
                     }
@@ -284,15 +289,11 @@ impl<'a> Finder<'a> {
         q.iter().zip(&pose.fixed).map(|(q, f)| f.unwrap_or(*q)).collect()
     }
 
-    /// True where a singular posture lies between a place and a posture: a path of the tool does not pass it. From a singular one it leads to either side.
-    fn parts(&self, place: &[f64], found: &[f64], held: &[bool]) -> bool {
-        smallest_singular_value(self.robot, place, held) >= SINGULAR && is_parted(self.robot, place, found, held)
-    }
-
     /// The solution next to `q` of those that will do.
     fn near(&mut self, pose: &PoseTarget, held: &[bool], q: &[f64], choice: Choice) -> Understood<Vec<f64>> {
         let (wanted, near) = (pose.base_from_flange(), Self::fixed(pose, q));
-        let will_do = |found: &[f64]| choice != Choice::Unparted || !self.parts(&near, found, held);
+        let robot = self.robot;
+        let will_do = |found: &[f64]| choice != Choice::Unparted || path_leads(robot, &near, found, held);
         if let Some(found) = self.solved(&wanted, &near, &near, held, None)
             && farthest(&near, &found) < NEAR
             && will_do(&found)
@@ -303,7 +304,7 @@ impl<'a> Finder<'a> {
         if all.is_empty() {
             return Err(unreached(""));
         }
-        all.retain(|found| choice != Choice::Unparted || !self.parts(&near, found, held));
+        all.retain(|found| will_do(found));
         let Some(best) = all.first() else { return Err(path_not_followed()) };
         let redundant = held.iter().filter(|h| !**h).count() > 6;
         let second = all.get(1).filter(|_| choice != Choice::Nearest && !redundant);

@@ -52,7 +52,9 @@ fn alike<'t>(tried: &'t [Explained], named: usize, limits: &Limits) -> impl Iter
 /// Where a wrong sign and a zero half a turn off fit alike, both.
 pub(super) fn with_sign_or_zero(tried: &[Explained], named: usize, limits: &Limits) -> Option<MistakeKind> {
     let zero = |kind: &MistakeKind| match kind {
-        MistakeKind::Zero { joint, lacking_deg } if *lacking_deg == HALF_TURN_DEG => Some(joint.clone()),
+        MistakeKind::Zero { joint, lacking_deg } if lacking_deg.abs() == HALF_TURN_DEG => {
+            Some((joint.clone(), *lacking_deg))
+        }
         _ => None,
     };
     let sign = |kind: &MistakeKind| match kind {
@@ -62,10 +64,10 @@ pub(super) fn with_sign_or_zero(tried: &[Explained], named: usize, limits: &Limi
     let kind = &tried[named].1;
     let (joints, zero) = match (sign(kind), zero(kind)) {
         (Some(joints), _) => (joints, alike(tried, named, limits).find_map(zero)?),
-        (_, Some(joint)) => (alike(tried, named, limits).find_map(sign)?, joint),
+        (_, Some(zero)) => (alike(tried, named, limits).find_map(sign)?, zero),
         _ => return None,
     };
-    Some(MistakeKind::SignsOrZero { joints, zero })
+    Some(MistakeKind::SignsOrZero { joints, zero: zero.0, lacking_deg: zero.1 })
 }
 
 /// The mistake with what fits alike as the mirror image of the arm, where that was tried.

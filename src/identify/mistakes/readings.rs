@@ -4,7 +4,7 @@ use crate::diagnose::{HALF_TURN_DEG, MistakeKind};
 use crate::model::mirror::mirror_images;
 use crate::model::robot::Robot;
 use crate::series::{LENGTH_UNITS, LengthUnit};
-use crate::urdf::JointKind;
+use crate::urdf::{JointKind, SEARCHED_M};
 
 /// The readings of all stops with one mistake undone, and its name.
 pub(in crate::identify) type Undone = (Vec<Vec<f64>>, MistakeKind);
@@ -18,7 +18,7 @@ pub(in crate::identify) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) ->
 /// Those of columns.
 pub(in crate::identify) fn columns_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> {
     let (names, kinds) = (&robot.chain.readings, &robot.chain.reading_kinds);
-    let n = names.len();
+    let (n, limits) = (names.len(), robot.chain.limits_or(SEARCHED_M));
     let named = |joints: &[usize]| joints.iter().map(|&k| names[k].clone()).collect();
     let mut all = Vec::new();
     let mut add = |mistake, change: &dyn Fn(&mut Vec<f64>)| {
@@ -50,7 +50,7 @@ pub(in crate::identify) fn columns_undone(robot: &Robot, given: &[Vec<f64>]) -> 
             }
         }
         if kinds[k] == JointKind::Revolute {
-            for lacking_deg in [90.0, -90.0, HALF_TURN_DEG] {
+            for lacking_deg in [90.0, -90.0, half_turn_deg(limits[k], given.iter().map(|q| q[k]))] {
                 add(MistakeKind::Zero { joint: names[k].clone(), lacking_deg }, &|q| q[k] += lacking_deg.to_radians());
             }
             for (are_degrees, factor) in units {
@@ -67,6 +67,13 @@ pub(in crate::identify) fn columns_undone(robot: &Robot, given: &[Vec<f64>]) -> 
     }
     add(MistakeKind::Reversed(names.clone()), &|q| q.reverse());
     all
+}
+
+/// Half a turn to the side that leads readings towards the middle of their limits.
+fn half_turn_deg((low, high): (f64, f64), readings: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let n = readings.len().max(1) as f64;
+    let mean = readings.sum::<f64>() / n;
+    if mean > 0.5 * (low + high) { -HALF_TURN_DEG } else { HALF_TURN_DEG }
 }
 
 /// Signs of three joints and more: those that make a mirror image of the arm, and those that do beside another wrong sign. Axes may be off by
@@ -119,4 +126,16 @@ pub(super) fn shifted_rows(given: &[Vec<f64>]) -> [Undone; 2] {
         shifted.rotate_left(if below { 1 } else { given.len().saturating_sub(1) });
         (shifted, MistakeKind::Rows { below, columns: Vec::new(), part: None })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_a_turn_leads_towards_the_middle_of_the_limits() {
+        assert_eq!(half_turn_deg((-2.0, 2.0), [1.5, 1.9].into_iter()), -HALF_TURN_DEG);
+        assert_eq!(half_turn_deg((-2.0, 2.0), [-1.5, 0.1].into_iter()), HALF_TURN_DEG);
+        assert_eq!(half_turn_deg((0.0, 6.2), [0.5].into_iter()), HALF_TURN_DEG);
+    }
 }
