@@ -35,8 +35,10 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Mark
 pub fn markers_off(Adjustment { problem, state }: &Adjustment, limits: &Limits) -> Vec<(usize, usize)> {
     let of_plate = |(p, (plate, shape)): (usize, (&Plate, &PlateShape))| {
         let all = plate.markers.iter().zip(&shape.corrections).enumerate();
+        // A tolerance that is found larger than stated is that of all markers.
+        let factor = problem.noise.marker.get(p).map_or(1.0, |found| found.max(1.0));
         let is_off = |(_, (marker, correction)): &(usize, (&Marker, &Vector3<f64>))| {
-            correction.norm() > limits.sigmas_beyond_tolerance * marker.sigma_m
+            correction.norm() > limits.sigmas_beyond_tolerance * factor * marker.sigma_m
         };
         all.filter(is_off).map(|(m, _)| (p, m)).collect::<Vec<_>>()
     };

@@ -243,7 +243,9 @@ impl Fit {
         let markers = self.marker_tallies();
         let bodies = self.body_tallies(stops, of_bodies);
         let by_bodies: f64 = bodies.iter().flatten().map(BodyTally::taken).sum();
-        let taken = self.effective_parameters(stops, latents, markers.iter().map(|[_, told]| told).sum()) - by_bodies;
+        let by_markers =
+            markers.iter().map(|[_, told]| told).sum::<f64>() + 3.0 * self.problem.moved_markers.len() as f64;
+        let taken = self.effective_parameters(stops, latents, by_markers) - by_bodies;
         let mut change = update_markers(&markers, noise).max(update_bodies(&bodies, noise));
         let total: f64 = self.linearised.terms.iter().map(|t| 2.0 * t.residuals.len() as f64).sum();
         for (camera, factor) in noise.pixel_factor.iter_mut().enumerate() {
@@ -288,12 +290,14 @@ impl Fit {
         change
     }
 
-    /// Of every plate: sum of squares of the corrections of its markers in units of their prior, and how many coordinates the data tell.
+    /// Of every plate: sum of squares of the corrections of its markers in units of their prior, and how many coordinates the data tell; without
+    /// those of markers that are let go, whose prior is not that of the plate.
     pub fn marker_tallies(&self) -> Vec<[f64; 2]> {
         let Adjustment { problem, state } = &self.adjustment;
         let of_plate = |(p, covariances): (usize, &Vec<Option<Matrix3<f64>>>)| {
             let seen = covariances.iter().enumerate().filter_map(|(m, c)| c.map(|c| (m, c)));
-            seen.fold([0.0; 2], |[squares, told], (m, c)| {
+            let kept = seen.filter(|(m, _)| !problem.moved_markers.contains(&(p, *m)));
+            kept.fold([0.0; 2], |[squares, told], (m, c)| {
                 let information = problem.marker_information(p, m);
                 let square = state.plates[p].corrections[m].norm_squared() * information;
                 [squares + square, told + 3.0 - c.trace() * information]
