@@ -1,13 +1,11 @@
 //! Is every marker where the plate file says, within its tolerance?
 
-use nalgebra::Vector3;
-
 use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
 use crate::problem::{Adjustment, PlateShape};
-use crate::series::{Marker, Plate};
+use crate::series::Plate;
 
 /// A marker lies elsewhere than its plate file says.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +21,7 @@ pub struct MarkerOff {
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<MarkerOff> {
     let problem = &fit.problem;
     let several = problem.plates.len() > 1;
-    let off = |(p, m): (usize, usize)| MarkerOff {
+    let off = |FarMarker { of: (p, m), .. }| MarkerOff {
         marker: problem.plates[p].markers[m].id,
         plate: several.then(|| problem.plate_name(p)),
         distance_m: fit.state.plates[p].corrections[m].norm(),
@@ -31,16 +29,25 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Mark
     markers_off(&fit.adjustment, setting.limits).into_iter().map(off).collect()
 }
 
-/// Markers far beyond their tolerance, each with its plate.
-pub fn markers_off(Adjustment { problem, state }: &Adjustment, limits: &Limits) -> Vec<(usize, usize)> {
+/// A marker far beyond its tolerance.
+#[derive(Debug, Clone, Copy)]
+pub struct FarMarker {
+    /// Its plate and its index.
+    pub of: (usize, usize),
+    /// How far, in sigmas of its tolerance.
+    pub sigmas: f64,
+}
+
+/// All of them. A tolerance that is found larger than stated is that of all markers.
+pub fn markers_off(Adjustment { problem, state }: &Adjustment, limits: &Limits) -> Vec<FarMarker> {
     let of_plate = |(p, (plate, shape)): (usize, (&Plate, &PlateShape))| {
-        let all = plate.markers.iter().zip(&shape.corrections).enumerate();
-        // A tolerance that is found larger than stated is that of all markers.
         let factor = problem.noise.marker.get(p).map_or(1.0, |found| found.max(1.0));
-        let is_off = |(_, (marker, correction)): &(usize, (&Marker, &Vector3<f64>))| {
-            correction.norm() > limits.sigmas_beyond_tolerance * factor * marker.sigma_m
-        };
-        all.filter(is_off).map(|(m, _)| (p, m)).collect::<Vec<_>>()
+        let all = plate.markers.iter().zip(&shape.corrections).enumerate();
+        let far = all.map(|(m, (marker, correction))| FarMarker {
+            of: (p, m),
+            sigmas: correction.norm() / (factor * marker.sigma_m),
+        });
+        far.filter(|marker| marker.sigmas > limits.sigmas_beyond_tolerance).collect::<Vec<_>>()
     };
     problem.plates.iter().zip(&state.plates).enumerate().flat_map(of_plate).collect()
 }

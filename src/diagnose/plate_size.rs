@@ -12,7 +12,7 @@ use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
 use crate::model::plate_modes::{ASPECT, DOT_GAIN, MODES};
-use crate::problem::{Adjustment, PlateShape, Problem, SCALE, State, UNKNOWN_SCALE, seen_markers, size_by_distance};
+use crate::problem::{Adjustment, PlateShape, Problem, SCALE, State, UNKNOWN_SCALE, size_by_distance, telling_markers};
 use crate::series::Plate;
 use crate::solve::{ComponentOptions, Status, System, estimate_components};
 
@@ -321,7 +321,6 @@ struct ReleasedSize<'a> {
 fn release(adjustment: &mut Adjustment, index: usize) {
     let at = adjustment.problem.layout.shapes[index].start + SCALE;
     adjustment.problem.layout.columns[at].prior_sigma = UNKNOWN_SCALE;
-    adjustment.problem.moved_markers.retain(|(plate, _)| *plate != index);
     let released = &mut adjustment.problem.plates[index];
     released.scale = None;
     // The markers keep the shape that was found, and grow with the plate: corrections with a tolerance in metres, and modes beside the stated size, would
@@ -426,8 +425,7 @@ fn places(problem: &Problem, shape: &PlateShape, plate: usize) -> Vec<Place> {
         found: shape.position(m),
         variance: problem.marker_information(plate, m).recip(),
     };
-    let told = seen_markers(problem, plate).into_iter().filter(|m| !problem.moved_markers.contains(&(plate, *m)));
-    told.map(place).collect()
+    telling_markers(problem, plate).into_iter().map(place).collect()
 }
 
 /// By how much the markers of a plate that were seen lie further apart than its file says.

@@ -11,7 +11,7 @@ use super::slopes::slopes;
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
-use crate::problem::{Adjustment, seen_markers};
+use crate::problem::{Adjustment, telling_markers};
 
 /// The tags of a plate are larger or smaller beside their distance than the plate file says.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +36,7 @@ pub fn tags_off(adjustment: &Adjustment, limits: &Limits) -> Vec<TagsOff> {
 fn of_plate(Adjustment { problem, state }: &Adjustment, plate: usize, limits: &Limits) -> Option<TagsOff> {
     let (nominal, shape) = (&problem.plates[plate], &state.plates[plate]);
     let tags = nominal.tags.as_ref()?;
-    let seen = seen_markers(problem, plate);
+    let seen = telling_markers(problem, plate);
     let middle = |k: usize| -> Vector3<f64> {
         let of_tag = nominal.markers.iter().filter(|m| m.id / 4 == nominal.markers[k].id / 4);
         of_tag.map(|m| m.position_m).sum::<Vector3<f64>>() / 4.0

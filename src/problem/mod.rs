@@ -55,7 +55,9 @@ pub use measured_series::{
     KnownCamera, LensChoice, MeasuredSeries, MeasuredStop, SeenBody, SeenLength, intern, stop_name,
 };
 pub use noise::Noise;
-pub use plate_distance::{PlateDistance, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance};
+pub use plate_distance::{
+    PlateDistance, UNKNOWN_SCALE, release_measured_scales, seen_markers, size_by_distance, telling_markers,
+};
 pub use plate_shape::PlateShape;
 pub use postures::{JOINTS_IN_COMMON, joined, posture_groups, related_readings};
 pub use rejection::{FitsReadings, ImageRejection, Misfit, Mismatch, ObservationRejection};

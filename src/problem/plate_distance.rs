@@ -82,3 +82,10 @@ pub fn seen_markers(problem: &Problem, plate: usize) -> BTreeSet<usize> {
     let images = problem.used().map(|(_, image)| image).filter(|image| image.plate == plate);
     images.flat_map(|image| image.used().map(|o| o.marker)).collect()
 }
+
+/// Those of them that tell of their plate what its file says: none that was let go.
+pub fn telling_markers(problem: &Problem, plate: usize) -> BTreeSet<usize> {
+    let mut seen = seen_markers(problem, plate);
+    seen.retain(|marker| !problem.moved_markers.contains(&(plate, *marker)));
+    seen
+}

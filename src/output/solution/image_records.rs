@@ -181,6 +181,7 @@ impl ImageRecords<'_> {
                 nominal_m: p.markers.iter().map(|m| m.position_m.into()).collect(),
                 radii_m: p.markers.iter().map(|m| [m.outer_radius_m, m.inner_radius_m]).collect(),
                 prior_sigma_m: p.markers.iter().map(|m| m.sigma_m).collect(),
+                moved: problem.moved_markers.iter().filter(|(of, _)| *of == k).map(|(_, m)| p.markers[*m].id).collect(),
                 tolerance_factor: problem.noise.marker.get(k).copied().unwrap_or(1.0),
                 correction_m: shape.corrections.iter().map(|c| (*c).into()).collect(),
                 position_m: (0..p.markers.len()).map(|m| shape.position(m).into()).collect(),

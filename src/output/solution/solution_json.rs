@@ -207,6 +207,9 @@ pub struct PlateRecord {
     pub radii_m: Vec<[f64; 2]>,
     /// Prior sigmas as stated, m.
     pub prior_sigma_m: Vec<f64>,
+    /// Ids of those that lie so far from where they were given that their prior was not used.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub moved: Vec<u32>,
     /// Estimated factor on them; 1 where the data do not tell it.
     #[serde(default = "one")]
     pub tolerance_factor: f64,
