@@ -23,8 +23,15 @@ pub struct OddPoints {
     pub wrong: Vec<usize>,
 }
 
+impl OddPoints {
+    /// True where leaving them out explains more than `displaced_share` of the squares that a step leaves.
+    pub fn explain(&self, moved: &DeviceMoved, limits: &Limits) -> bool {
+        (self.without.rms_m / moved.rms_m).powi(2) < 1.0 - limits.displaced_share
+    }
+}
+
 /// Points that are more than `set_aside_factor` times what is usual, and more than `displaced_m`, from where the others put them, with the fit of
-/// these: least squares over what is left, until it is the same. `None` where there is none, or more than a fifth. Usual is the median of the others
+/// these: least squares over what is left, the farthest left out first, until it is the same. `None` where there is none, or more than a fifth. Usual is the median of the others
 /// together with what the model is stated to miss at the point, m (`stated_m`, of every point; empty where nothing is stated).
 pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], limits: &Limits) -> Option<OddPoints> {
     let beside = |odd: &[usize]| Beside::these(robot, points, odd, (stated_m, limits));
@@ -32,7 +39,7 @@ pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], lim
     let mut odd: Vec<usize> = Vec::new();
     let mut fit = beside(&odd)?;
     loop {
-        let all: Vec<usize> = (0..points.len()).filter(|k| odd.contains(k) || fit.beyond.contains(k)).collect();
+        let all = fit.with_the_farthest(&odd);
         if all.len() * limits.touches_for_one_left_out > points.len() {
             return None;
         }
@@ -52,6 +59,9 @@ pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], lim
     let wrong = wrong_points(robot, points, (&odd, &fit.without), limits).unwrap_or_default();
     Some(OddPoints { points: odd, off_m, without: fit.without, wrong })
 }
+
+/// A point that is off by so much less than the farthest may only be drawn along by it.
+const DRAWN_ALONG: f64 = 0.5;
 
 /// All points beside the fit of some.
 struct Beside {
@@ -81,6 +91,16 @@ impl Beside {
         let off_m: Vec<f64> = points.iter().map(|p| without.residual_m(robot, p).norm()).collect();
         let beyond = (0..points.len()).filter(|k| off_m[*k] > bound(*k)).collect();
         Some(Self { without, off_m, beyond })
+    }
+
+    /// What was left out, and of the others beyond those that no other draws along by far more than they are off.
+    fn with_the_farthest(&self, left_out: &[usize]) -> Vec<usize> {
+        let kept = self.beyond.iter().filter(|k| !left_out.contains(k));
+        let farthest_m = kept.clone().map(|k| self.off_m[*k]).fold(0.0, f64::max);
+        let far = kept.filter(|k| self.off_m[**k] > DRAWN_ALONG * farthest_m);
+        let mut all: Vec<usize> = left_out.iter().chain(far).copied().collect();
+        all.sort_unstable();
+        all
     }
 
     /// Those of the points that were left out which are beyond, with the fit of all others: what it finds good was drawn along by what is not.

@@ -19,14 +19,19 @@ pub struct MarkerOff {
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<MarkerOff> {
-    let problem = &fit.problem;
+    named_markers_off(fit, setting.limits)
+}
+
+/// Markers far beyond their tolerance, as findings.
+pub fn named_markers_off(adjustment: &Adjustment, limits: &Limits) -> Vec<MarkerOff> {
+    let Adjustment { problem, state } = adjustment;
     let several = problem.plates.len() > 1;
     let off = |FarMarker { of: (p, m), .. }| MarkerOff {
         marker: problem.plates[p].markers[m].id,
         plate: several.then(|| problem.plate_name(p)),
-        distance_m: fit.state.plates[p].corrections[m].norm(),
+        distance_m: state.plates[p].corrections[m].norm(),
     };
-    markers_off(&fit.adjustment, setting.limits).into_iter().map(off).collect()
+    markers_off(adjustment, limits).into_iter().map(off).collect()
 }
 
 /// A marker far beyond its tolerance.

@@ -78,7 +78,7 @@ pub use left_out::shifted_measurements::ShiftedMeasurements;
 pub use length_standard::{ContradictedLengths, PlateSays};
 pub use lens_not_in_ros::LensNotInRos;
 pub use lost_images::LostImages;
-pub use marker_off::{FarMarker, MarkerOff, markers_off};
+pub use marker_off::{FarMarker, MarkerOff, markers_off, named_markers_off};
 pub use measurement_scatter::MeasurementsScatter;
 pub use mirror_image::MirrorImageFits;
 pub use mistake::{HALF_TURN_DEG, Mistake, MistakeKind, RowsOf, ShiftedPart};

@@ -43,9 +43,20 @@ pub(super) fn lights_of<'a>(images: &'a Path, of_all: &[PathBuf], series: &'a Pa
     own.filter(|folder| with(folder) == 1 && !series.starts_with(folder)).collect()
 }
 
-/// Says of dark/ and white/ that lie beside the images and are of no camera.
+/// The same of a series of one camera whose images lie in one folder.
+pub(super) fn unused_light_of_one(series: &Series) -> Vec<Notice> {
+    match &series.source {
+        Source::Images { folder, .. } => {
+            unused_light(series, std::slice::from_ref(folder), std::slice::from_ref(series))
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Says of dark/ and white/ that lie beside the images, or within their folders, and are of no camera.
 pub(super) fn unused_light(series: &Series, of_all: &[PathBuf], views: &[Series]) -> Vec<Notice> {
-    let mut folders: Vec<&Path> = of_all.iter().filter_map(|images| images.parent()).collect();
+    let mut folders: Vec<&Path> =
+        of_all.iter().flat_map(|images| [Some(images.as_path()), images.parent()]).flatten().collect();
     folders.push(&series.folder);
     folders.sort();
     folders.dedup();

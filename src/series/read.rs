@@ -9,7 +9,7 @@ use super::image_file;
 use super::image_folder::{by_name, image_files, other_files};
 use super::inputs::InputFile;
 use super::joints::{SeriesStop, StopKey, Stops};
-use super::light::{Light, lights_of, unused_light};
+use super::light::{Light, lights_of, unused_light, unused_light_of_one};
 use super::manifest::{Manifest, StopOrder};
 use super::measurement_series::{Series, Source, file_name, own_manifest};
 use super::observation_file;
@@ -124,6 +124,7 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     let folder = folder.to_path_buf();
     let mut series =
         Series { name, folder, manifest, plate, stops, source, controller, spatial, run: None, notices, inputs };
+    series.notices.extend(unused_light_of_one(&series));
     if by_cameras {
         let mut views = views_of(&mut series, use_observations)?;
         views.extend(measured_in_space(&series, &views));

@@ -6,7 +6,7 @@ use super::camera_section::CameraMount;
 use super::controller_file;
 use super::image_folder::image_files;
 use super::joints::{DEFAULT_PLACEMENT, SeriesStop, Stops};
-use super::light::Light;
+use super::light::{Light, unused_light_of_one};
 use super::manifest::Manifest;
 use super::measurement_series::{Series, Source, file_name};
 use super::observation_file;
@@ -58,7 +58,10 @@ pub fn read_without_robot(folder: &Path) -> Result<Series> {
     };
     let (folder, notices) = (folder.to_path_buf(), Vec::new());
     let (stops, spatial) = (Stops { stops, ..Stops::default() }, SpatialFiles::default());
-    Ok(Series { name, folder, manifest, plate, stops, source, controller: None, spatial, run: None, notices, inputs })
+    let mut series =
+        Series { name, folder, manifest, plate, stops, source, controller: None, spatial, run: None, notices, inputs };
+    series.notices = unused_light_of_one(&series);
+    Ok(series)
 }
 
 /// A series of single images of a plate.

@@ -228,6 +228,28 @@ fn a_device_that_was_moved_is_told_from_noise() {
     assert!((found.by_m - 3e-3).abs() < 3.0 * NOISE_M && found.rms_m < 2.5 * NOISE_M, "{found:?}");
 }
 
+/// A step behind the first rows, or before the last, explains much of what one point is off.
+#[test]
+fn a_single_wrong_point_is_no_move_of_the_device() {
+    let ((_, robot), limits) = (kr6(), Limits::default());
+    for (count, wrong) in [(100, 2), (100, 50), (30, 2), (30, 27), (30, 5), (14, 2), (12, 6), (10, 1)] {
+        let mut seen = points(&robot, count, NOISE_M);
+        seen[wrong].position_m.y += 5e-3;
+        let odd = odd_points(&robot, &seen, &[], &limits);
+        assert_eq!(odd.as_ref().map(|odd| odd.points.clone()), Some(vec![wrong]), "{count}");
+        let moved = device_moved(&robot, &seen, &fit_points(&robot, &seen).unwrap(), &limits);
+        println!("{count} {wrong}: {moved:?}");
+        assert!(moved.is_none_or(|moved| odd.unwrap().explain(&moved, &limits)), "{count} {moved:?}");
+    }
+    // Six rows behind a move are neither odd, nor a part of it.
+    let mut seen = points(&robot, 40, NOISE_M);
+    seen[34..].iter_mut().for_each(|p| p.position_m.y += 3e-3);
+    let moved = device_moved(&robot, &seen, &fit_points(&robot, &seen).unwrap(), &limits).unwrap();
+    assert_eq!((moved.first, moved.cause), (34, StepCause::Device));
+    let odd = odd_points(&robot, &seen, &[], &limits);
+    assert!(odd.is_none_or(|odd| !odd.explain(&moved, &limits)));
+}
+
 /// The robot with errors as robots have them: origins off by 0.7 mm and 1.4 mrad RMS per axis, zeros by 3.5 mrad.
 fn with_usual_errors(robot: &Robot, phase: f64) -> Robot {
     let mut robot = robot.clone();

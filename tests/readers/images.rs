@@ -88,6 +88,27 @@ fn dark_and_white_images_of_every_camera_are_its_own() {
     assert_eq!(places, ["/dark", "/white", "/images/white"]);
 }
 
+/// Two cameras with one folder, of neither of which the light is; and one camera with two folders of the same name.
+#[test]
+fn light_that_is_not_used_is_said() {
+    let unused = |folder: &TempDir| {
+        let series = read(folder.path()).unwrap();
+        let of_light = series.notices.iter().filter(|n| n.code == Code::FlatFieldUnused);
+        of_light.map(|n| n.place.replace(&folder.path().display().to_string(), "")).collect::<Vec<_>>()
+    };
+    let of_both =
+        MANIFEST.replace("name = \"left\"", "name = \"left\"\nimages = \"images\"").replace("pictures", "images");
+    let table = "stop,camera,image\none,left,a.png\nthree,wrist,c.png\n";
+    let images = [("images/a.png", ""), ("images/c.png", ""), ("images/dark/1.png", "")];
+    let two = folder(&[&[("series.toml", of_both.as_str()), ("images.csv", table)][..], &images].concat());
+    assert_eq!(unused(&two), ["/images/dark"]);
+    let of_one = MANIFEST.split("[[camera]]").next().unwrap();
+    let joints = "image,j1\na.png,0.1\nc.png,0.2\n";
+    let one = folder(&[&[("series.toml", of_one), ("joints.csv", joints), ("dark/1.png", "")][..], &images].concat());
+    fs::remove_file(one.path().join("images.csv")).unwrap();
+    assert_eq!(unused(&one), ["/dark"]);
+}
+
 /// Of one camera they are its own wherever its images lie.
 #[test]
 fn dark_and_white_images_of_a_series_are_those_of_its_only_camera() {

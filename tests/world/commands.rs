@@ -66,6 +66,22 @@ fn wrong_wishes_of_a_simulation_are_refused() {
     }
 }
 
+#[test]
+fn harmonics_of_a_robot_model_without_gears_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("result");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let [urdf, series] = ["robots/kuka_kr6_r900/kuka_kr6_r900.urdf", "datasets/kr6_small"].map(|path| root.join(path));
+    for model in ["rigid", "sag"] {
+        let given = ["identify", "--urdf", urdf.to_str().unwrap(), "--series", series.to_str().unwrap()];
+        let asked = ["--robot-model", model, "--harmonics", "4", "--out", out.to_str().unwrap()];
+        let output = robotcal(&[&given[..], &asked].concat());
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert_says(&text(&output), Code::OptionConflict, &["--harmonics", model]);
+    }
+    assert!(!out.exists());
+}
+
 /// Rods keep the flange of a palletiser level: nearer views are no help.
 #[test]
 fn an_arm_that_tilts_nothing_is_told_what_measures_it() {

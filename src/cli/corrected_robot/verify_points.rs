@@ -24,12 +24,14 @@ pub(super) fn apart(
     limits: &Limits,
     reasons: &mut Reasons,
 ) -> (bool, Vec<usize>) {
-    // What the model itself may miss, different in every posture, is no step of the device.
-    let may_miss = expected.is_some_and(|expected| fit.rms_m <= expected.all.most_m);
-    let moved = device_moved(robot, points, fit, limits).filter(|_| !may_miss);
-    let is_moved = moved.is_some_and(|moved| moved.cause == StepCause::Device);
     let stated_m = expected.map_or(&[][..], |expected| &expected.each_m);
-    let odd = if is_moved { None } else { odd_points(robot, points, stated_m, limits) };
+    let odd = odd_points(robot, points, stated_m, limits);
+    // What the model itself may miss, different in every posture, is no step of the device, nor is what single points do.
+    let may_miss = expected.is_some_and(|expected| fit.rms_m <= expected.all.most_m);
+    let is_step = |moved: &DeviceMoved| !may_miss && !odd.as_ref().is_some_and(|odd| odd.explain(moved, limits));
+    let moved = device_moved(robot, points, fit, limits).filter(is_step);
+    let is_moved = moved.is_some_and(|moved| moved.cause == StepCause::Device);
+    let odd = odd.filter(|_| !is_moved);
     moved.iter().for_each(say_moved);
     odd.iter().for_each(say_odd);
     reasons.doubts.extend(odd.iter().map(in_verdict));

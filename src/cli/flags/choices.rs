@@ -95,6 +95,11 @@ impl ChoiceArgs {
             if given.is_empty() { before } else { given }
         };
         let before = defaults.selection;
+        let model = self.robot_model.map(Into::into).or(config.robot_model).unwrap_or(defaults.model);
+        if self.harmonics.is_some_and(|asked| asked > 0) && !model.has_gears() {
+            let what = format!("--robot-model {} has no gears, and with them no harmonics", model.name());
+            return Err(Error::new(Code::OptionConflict, "--harmonics", what, "leave one of the two out"));
+        }
         Ok(Options {
             harmonics: harmonics(self.harmonics.or(config.harmonics))?.unwrap_or(defaults.harmonics),
             joint_noise: joint_noise(self.joint_noise)?.unwrap_or(defaults.joint_noise),
@@ -103,7 +108,7 @@ impl ChoiceArgs {
                 Some(Tolerance::Stated) => MarkerTolerance::Stated,
                 None => defaults.marker_tolerance,
             },
-            model: self.robot_model.map(Into::into).or(config.robot_model).unwrap_or(defaults.model),
+            model,
             selection: Selection {
                 parameters: parameters.or(config.parameters).unwrap_or(before.parameters),
                 free: joined(&config.free, &self.free, before.free),

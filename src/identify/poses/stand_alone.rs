@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, Matrix3, Matrix3x6, Matrix6};
 
 use crate::assess::{Limits, camera_shows_pattern};
 use crate::diagnose::{
-    CheckContext, Diagnosis, DoubtedSize, Finding, many_left_out, observations_left_out, residual_pattern, tags_off,
-    uneven_plates,
+    CheckContext, Diagnosis, DoubtedSize, Finding, many_left_out, named_markers_off, observations_left_out,
+    residual_pattern, tags_off, uneven_plates,
 };
 use crate::error::{Code, Error, Notice, Result};
 use crate::fit::{Fit, FreePose, FreePoses, PlacedCamera};
@@ -114,6 +114,7 @@ pub fn stand_alone(series: &[MeasuredSeries], limits: &Limits) -> Result<StandAl
     findings.extend(many_left_out(&fit.problem, limits).map(Finding::from));
     findings.extend(observations_left_out(&fit, limits).map(|found| found.given_by(&series).into()));
     findings.extend(residual_pattern(&fit, limits).map(|found| found.given_by(&series).into()));
+    findings.extend(named_markers_off(&fit, limits).into_iter().map(Finding::from));
     findings.extend(tags_off(&fit, limits).into_iter().map(Finding::from));
     let is_doubted = findings.iter().any(Finding::fails);
     findings.extend(uneven(&fit, &series, is_doubted, limits).into_iter().map(Finding::from));

@@ -27,6 +27,11 @@ impl RobotModel {
         other <= self && (self, other) != (Self::Sag, Self::Gear)
     }
 
+    /// True where it has gears, or may have them.
+    pub const fn has_gears(self) -> bool {
+        !matches!(self, Self::Rigid | Self::Sag)
+    }
+
     /// Its name in options and files.
     pub const fn name(self) -> &'static str {
         match self {

@@ -282,7 +282,7 @@ impl Fit {
                 continue;
             }
             let next = family.asked(squares, determined).min(2.0 * family.factor);
-            if next > family.least {
+            if next.max(family.factor) > family.least {
                 change = change.max((next / family.factor - 1.0).abs());
             }
             family.factor = next;
