@@ -65,6 +65,11 @@ pub(super) fn everywhere(robot: &Robot) -> Vec<Posture> {
     halton_stops(&robot.chain.ranges(), SAMPLES)
 }
 
+/// The part of [`FlangeModel::workspace`] that lies within all joint limits; the other fills the region of the stops with as many.
+pub fn within_joint_limits(workspace: &[WorkspacePoint]) -> &[WorkspacePoint] {
+    &workspace[workspace.len() / 2..]
+}
+
 /// What is needed to predict.
 #[derive(Debug, Clone)]
 pub struct FlangeModel<'a> {
@@ -246,7 +251,7 @@ impl<'a> FlangeModel<'a> {
 
     /// Samples of the region of the stops, then of everything within the joint limits.
     pub fn workspace(&self) -> Vec<WorkspacePoint> {
-        let stops = halton_stops(&self.covered, SAMPLES).into_iter().chain(everywhere(&self.robot));
+        let stops = self.region().into_iter().chain(everywhere(&self.robot));
         stops
             .map(|stop| {
                 let found = self.at(&stop.readings);

@@ -35,7 +35,7 @@ pub use advice::Advice;
 pub use alone::urdf_alone;
 pub use clustered::{Clustered, RootInformation, StopInformation, clustered_covariance};
 pub use expected_errors::expected_mm;
-pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint};
+pub use flange::{FlangeModel, PredictedFlange, WorkspacePoint, within_joint_limits};
 pub use held::{HeldTest, contradicted};
 pub use hold_out::{
     Accuracy, Errors, ImageError, Refit, cluster_of_images, error_of_predicted, folds, hold_out, hold_out_images,

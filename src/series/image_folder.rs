@@ -9,15 +9,18 @@ use crate::error::{Error, Result, plain_name};
 
 const IMAGE_EXTENSIONS: [&str; 9] = ["png", "tif", "tiff", "pgm", "pnm", "ppm", "jpg", "jpeg", "bmp"];
 
+/// True for a file that is an image by the end of its name.
+pub fn is_image(path: &Path) -> bool {
+    path.extension().is_some_and(|end| IMAGE_EXTENSIONS.contains(&end.to_string_lossy().to_lowercase().as_str()))
+}
+
 /// Image files of a folder in the order of their names.
 pub(super) fn image_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, &e))?;
     let mut files = Vec::new();
     for entry in entries {
         let path = entry.map_err(|e| Error::io(folder, &e))?.path();
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let hidden = file_name(&path).starts_with('.');
-        if extension.is_some_and(|e| IMAGE_EXTENSIONS.contains(&e.as_str())) && !hidden {
+        if is_image(&path) && !file_name(&path).starts_with('.') {
             plain_name("image", &file_name(&path), folder.display())?;
             files.push(path);
         }

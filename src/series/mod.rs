@@ -46,6 +46,7 @@ pub use camera_section::{CameraMount, CameraSection, Cameras};
 pub use contact_file::ContactRow;
 pub use controller_file::parse_controller;
 pub use controller_poses::{ControllerPoses, ReadOtherwise};
+pub use image_folder::is_image;
 pub use inputs::{InputFile, sha256};
 pub use joints::{Covariates, DEFAULT_PLACEMENT, SeriesStop, StopKey, Stops};
 pub use manifest::{AngleUnit, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder};

@@ -17,7 +17,7 @@ use crate::output::corrections::FileFinding;
 use crate::output::restore::{FoundModel, exported_model, measured_series};
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::problem::{Exposures, MeasuredSeries, postures_of_stops};
-use crate::series::{InputFile, SpatialFiles};
+use crate::series::{InputFile, SpatialFiles, is_image};
 
 /// The solution from which a description came, with as much of its model as is judged.
 pub(super) struct Stated {
@@ -45,8 +45,8 @@ pub(super) struct ExpectedAtPoints {
 
 /// Files of a series that hold what was measured, beside images and recordings.
 const OBSERVATIONS: &str = "observations.csv";
-/// Ends of the names of images and recordings.
-const RECORDED: [&str; 8] = ["png", "tif", "tiff", "pgm", "jpg", "jpeg", "bmp", "mcap"];
+/// End of the name of a recording.
+const RECORDING: &str = "mcap";
 /// Folders of images that several series may have in common.
 const FLAT_FIELD: [&str; 2] = ["dark", "white"];
 
@@ -249,5 +249,5 @@ fn is_measurement(path: &Path) -> bool {
     let (name, end) = (text(path.file_name()), text(path.extension()));
     let folder = text(path.parent().and_then(Path::file_name));
     let is_table = name == OBSERVATIONS || SpatialFiles::NAMES.contains(&name.as_str());
-    is_table || (RECORDED.contains(&end.as_str()) && !FLAT_FIELD.contains(&folder.as_str()))
+    is_table || ((is_image(path) || end == RECORDING) && !FLAT_FIELD.contains(&folder.as_str()))
 }

@@ -1,6 +1,6 @@
 //! Two solutions against each other over the workspace.
 
-use crate::assess::{MeasuredPoint, fit_points};
+use crate::assess::{MeasuredPoint, WorkspacePoint, fit_points, within_joint_limits};
 use crate::error::{Code, Error, Result};
 use crate::output::restore::{FoundModel, entered_offsets, found_model};
 use crate::output::solution_json::SolutionRecord;
@@ -72,22 +72,18 @@ pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<Solut
         return Err(Error::new(Code::RobotDiffers, "solutions", what, "compare solutions of the same robot"));
     }
     let (first, second) = (found_model(a)?, found_model(b)?);
-    let places: Vec<Place> = [(a, &second), (b, &first)]
-        .into_iter()
-        .flat_map(|(record, other)| {
-            let other = other.flange();
-            // The first half of a map fills the region of the stops, the other all joint limits.
-            let of_limits = record.workspace.len() / 2;
-            record.workspace.iter().enumerate().map(move |(k, w)| Place {
-                readings: w.readings.clone(),
-                covered: w.covered && other.as_ref().is_some_and(|o| o.at(&w.readings).outside.is_empty()),
-                of_limits: k >= of_limits,
-            })
-        })
-        .collect();
-    let all: Vec<&Place> = places.iter().filter(|p| p.of_limits).collect();
-    let covered: Vec<&Place> = places.iter().filter(|p| p.covered).collect();
-    let everywhere = difference(&first, &second, &all).ok_or_else(|| {
+    let sides = [(a, &second), (b, &first)];
+    let everywhere = sides.iter().flat_map(|(record, _)| within_joint_limits(&record.workspace));
+    let everywhere: Vec<&[f64]> = everywhere.map(|w| w.readings.as_slice()).collect();
+    let covered = sides.iter().flat_map(|(record, other)| {
+        let other = other.flange();
+        let is_covered = move |w: &&WorkspacePoint| {
+            w.covered && other.as_ref().is_some_and(|other| other.at(&w.readings).outside.is_empty())
+        };
+        record.workspace.iter().filter(is_covered)
+    });
+    let covered: Vec<&[f64]> = covered.map(|w| w.readings.as_slice()).collect();
+    let everywhere = difference(&first, &second, &everywhere).ok_or_else(|| {
         Error::new(Code::SolutionDiffers, "solutions", "they have no workspace map in common", "identify both again")
     })?;
     Ok(SolutionDifference {
@@ -99,42 +95,30 @@ pub fn compare_solutions(a: &SolutionRecord, b: &SolutionRecord) -> Result<Solut
     })
 }
 
-struct Place {
-    readings: Vec<f64>,
-    /// Within the region of the stops of both.
-    covered: bool,
-    /// One of those that fill the joint limits.
-    of_limits: bool,
-}
-
 /// Fewest places that determine frames and flange point.
 const FEWEST_PLACES: usize = 8;
 
-fn difference(a: &FoundModel, b: &FoundModel, places: &[&Place]) -> Option<Difference> {
+/// At these readings, rad or m.
+fn difference(a: &FoundModel, b: &FoundModel, places: &[&[f64]]) -> Option<Difference> {
     if places.len() < FEWEST_PLACES {
         return None;
     }
     // The flange of the first as a device would see it; frame and point on the flange of the second are fitted.
     let points: Vec<MeasuredPoint> = (places.iter())
-        .map(|p| MeasuredPoint {
-            position_m: a.robot.base_from_tip(&p.readings).translation,
-            readings: p.readings.clone(),
-        })
+        .map(|q| MeasuredPoint { position_m: a.robot.base_from_tip(q).translation, readings: q.to_vec() })
         .collect();
     let fit = fit_points(&b.robot, &points)?;
     let (worst, worst_m) = (fit.residuals_m.iter().map(|r| r.norm()).enumerate()).max_by(|x, y| x.1.total_cmp(&y.1))?;
     let stated = || {
         let (a, b) = (a.flange()?, b.flange()?);
-        let sum: f64 = (places.iter())
-            .map(|p| a.at(&p.readings).sigmas()[0].powi(2) + b.at(&p.readings).sigmas()[0].powi(2))
-            .sum();
+        let sum: f64 = (places.iter()).map(|q| a.at(q).sigmas()[0].powi(2) + b.at(q).sigmas()[0].powi(2)).sum();
         Some((sum / places.len() as f64).sqrt())
     };
     Some(Difference {
         places: places.len(),
         rms_m: fit.rms_m,
         worst_m,
-        worst_at: places[worst].readings.clone(),
+        worst_at: places[worst].to_vec(),
         stated_m: stated(),
     })
 }
