@@ -19,17 +19,33 @@ const TWISTS_DRAWN: f64 = 4.0;
 /// The same of sag: as much as three joints say that carry an arm, for stops that are few tell hardly any of it, and what they tell is of the twists, too.
 const GRAVITY_DRAWN: f64 = 12.0;
 
-/// Name of the family of the twists.
-const TWISTS: &str = "origins of the joints";
+/// What the parameters of a family are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FamilyKind {
+    /// The displacement field of a camera, by its index.
+    Field(usize),
+    /// Origins of the joints.
+    Twists,
+    /// Sag of joints whose masses are not known.
+    Gravity,
+}
 
-/// Name of that of the sag of joints whose masses are not known.
-const GRAVITY: &str = "gravity";
+impl FamilyKind {
+    /// Weight with which the factor is drawn to 1, and the smallest factor.
+    const fn bounds(self) -> (f64, f64) {
+        match self {
+            Self::Field(_) => (0.0, SMALLEST_FACTOR),
+            Self::Twists => (TWISTS_DRAWN, SMALLEST_FACTOR),
+            Self::Gravity => (GRAVITY_DRAWN, 1.0),
+        }
+    }
+}
 
 /// Parameters alike whose prior sigmas have one factor in common, a variance component.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Family {
-    /// Name, for messages.
-    pub name: String,
+    /// What they are.
+    pub kind: FamilyKind,
     /// Columns.
     pub columns: Vec<usize>,
     /// Prior sigma of each column at the factor 1, in its unit.
@@ -48,17 +64,14 @@ impl Family {
     /// The displacement field of camera `camera`, across what lens formula and pose can say; `None` for a lens without one.
     pub fn of_field(layout: &Layout, state: &State, camera: usize) -> Option<Self> {
         let held = state.cameras[camera].parametric_directions()?;
-        Some(Self {
-            held,
-            ..Self::new(&format!("displacement field {camera}"), layout, layout.fields[camera].clone().collect())
-        })
+        Some(Self { held, ..Self::new(FamilyKind::Field(camera), layout, layout.fields[camera].clone().collect()) })
     }
 
     /// The twists of the joints whose priors nobody has stated: how far robots are from nominal is known to a factor of two.
     pub fn of_twists(layout: &Layout, is_stated: impl Fn(usize) -> bool) -> Option<Self> {
         let columns: Vec<usize> =
             layout.twists.clone().filter(|c| !is_stated(*c) && !layout.is_between_bases(*c)).collect();
-        (!columns.is_empty()).then(|| Self { drawn: TWISTS_DRAWN, ..Self::new(TWISTS, layout, columns) })
+        (!columns.is_empty()).then(|| Self::new(FamilyKind::Twists, layout, columns))
     }
 
     /// Sag of the joints where masses are not known and whose priors nobody has stated; `None` without. It may be more than what is usual, and not less:
@@ -67,12 +80,7 @@ impl Family {
         let terms = layout.terms.clone().zip(&robot.terms);
         let of_gravity = terms.filter(|(c, t)| matches!(t.term, Term::Gravity { .. }) && !is_stated(*c));
         let columns: Vec<usize> = of_gravity.map(|(c, _)| c).collect();
-        (!columns.is_empty()).then(|| Self { drawn: GRAVITY_DRAWN, least: 1.0, ..Self::new(GRAVITY, layout, columns) })
-    }
-
-    /// True for the family of the twists.
-    pub fn is_of_twists(&self) -> bool {
-        self.name == TWISTS
+        (!columns.is_empty()).then(|| Self::new(FamilyKind::Gravity, layout, columns))
     }
 
     /// The factor that sums of squares and the number of determined parameters ask for.
@@ -81,22 +89,15 @@ impl Family {
     }
 
     /// A family of columns at their present priors.
-    pub fn new(name: &str, layout: &Layout, columns: Vec<usize>) -> Self {
+    pub fn new(kind: FamilyKind, layout: &Layout, columns: Vec<usize>) -> Self {
         let base = columns.iter().map(|&c| layout.columns[c].prior_sigma).collect();
-        Self {
-            name: name.into(),
-            held: DMatrix::zeros(columns.len(), 0),
-            columns,
-            base,
-            factor: 1.0,
-            drawn: 0.0,
-            least: SMALLEST_FACTOR,
-        }
+        let (drawn, least) = kind.bounds();
+        Self { kind, held: DMatrix::zeros(columns.len(), 0), columns, base, factor: 1.0, drawn, least }
     }
 
-    /// Takes the factor of the family of the same name, where there is one.
+    /// Takes the factor of the family of the same kind, where there is one.
     pub fn take_factor(&mut self, others: &[Self]) {
-        self.factor = others.iter().find(|f| f.name == self.name).map_or(self.factor, |f| f.factor);
+        self.factor = others.iter().find(|f| f.kind == self.kind).map_or(self.factor, |f| f.factor);
     }
 
     /// Gives the columns the priors of the present factor.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::body::{BodyMeasurement, Instrument};
 use super::bounds::Bounds;
-use super::family::Family;
+use super::family::{Family, FamilyKind};
 use super::image::Image;
 use super::layout::Layout;
 use super::length::MeasuredLength;
@@ -166,7 +166,7 @@ impl Problem {
 
     /// Factor on the stated sizes of the twists; 1 where they are held at what is stated.
     pub fn twist_factor(&self) -> f64 {
-        self.families.iter().find(|f| f.is_of_twists()).map_or(1.0, |f| f.factor)
+        self.families.iter().find(|f| f.kind == FamilyKind::Twists).map_or(1.0, |f| f.factor)
     }
 
     /// Sigma of a column before the data changed it: what robots usually deviate by.

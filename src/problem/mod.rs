@@ -42,7 +42,7 @@ pub use bounds::Bounds;
 pub use condensed::{SeenAtStop, by_columns, condensed};
 pub use equations::{E, Equations, MarkerCoupling, MarkerTerms, Sight};
 pub use exposures::Exposures;
-pub use family::Family;
+pub use family::{Family, FamilyKind};
 pub use given::{HUBER, Problem, TakenBodies};
 pub use image::Image;
 pub use layout::{Column, Layout, Names, OriginPrior};

@@ -7,8 +7,7 @@ use robotcal::identify::{Options, RobotModel, Selection, StatedPrior, identify};
 use robotcal::linalg::median;
 use robotcal::model::joint_terms::TermKind;
 use robotcal::model::robot::Robot;
-use robotcal::problem::MeasuredSeries;
-use robotcal::problem::OriginPrior;
+use robotcal::problem::{FamilyKind, MeasuredSeries, OriginPrior};
 use robotcal::series::{Plate, PlateKind};
 use robotcal::simulate::{RobotErrors, SimulatedSeries, WorldRequest, series};
 use robotcal::study::measured;
@@ -147,7 +146,7 @@ fn how_much_an_arm_sags_is_told_by_the_robot_itself() {
             let world = world(errors, seed);
             let options = Options { model: RobotModel::Full, ..Options::default() };
             let s = identify(kr6(), &[measured(&world, &kr6())], &options).unwrap();
-            let factor = s.fit.problem.families.iter().find(|f| f.name == "gravity").unwrap().factor;
+            let factor = s.fit.problem.families.iter().find(|f| f.kind == FamilyKind::Gravity).unwrap().factor;
             let poses: Vec<(Vec<f64>, Pose)> =
                 world.truth.held_out.iter().map(|h| (h.readings.clone(), h.base_from_tip.pose())).collect();
             let error_m = flange_error_m(&s.fit.state.robot, &s.fit.state.placements[0], &poses).unwrap();

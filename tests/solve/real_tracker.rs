@@ -9,7 +9,7 @@ use robotcal::identify::{Estimator, JointNoise, Options, PoseStage, Solution, fi
 use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::Term;
 use robotcal::model::robot::Robot;
-use robotcal::problem::{Adjustment, LensChoice, MeasuredSeries, State};
+use robotcal::problem::{Adjustment, FamilyKind, LensChoice, MeasuredSeries, State};
 use robotcal::solve::{ComponentOptions, estimate_components};
 
 const SERIES: [&str; 3] = ["nachi-2025-01-17", "nachi-2025-02-04", "nachi-2025-02-19"];
@@ -97,7 +97,7 @@ fn study_of_series_on_the_tracker() {
                     j.expected_mm,
                     j.log_density,
                     j.best,
-                    s.fit.problem.families.iter().find(|f| f.is_of_twists()).map_or(1.0, |f| f.factor),
+                    s.fit.problem.families.iter().find(|f| f.kind == FamilyKind::Twists).map_or(1.0, |f| f.factor),
                     s.evidences.iter().map(|e| (e.model, e.log_evidence)).collect::<Vec<_>>(),
                     s.fit.linearised.cost,
                     s.accuracy.calibrated.rms_mm,

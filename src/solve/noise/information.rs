@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use super::latent::{Latent, local_latents, stop_latents};
 use super::tally::{JOINT_NOISE_FLOOR, SHRINKAGE};
 use crate::linalg::SymmetricFactor;
-use crate::problem::{Adjustment, Family, Noise, Problem};
+use crate::problem::{Adjustment, Family, FamilyKind, Noise, Problem};
 use crate::solve::elimination::system::Elimination;
 use crate::solve::optimum::covariance::Covariance;
 use crate::solve::optimum::fit::Fit;
@@ -65,7 +65,7 @@ impl Spread {
 fn from_data(fit: &Fit, cov: &Covariance, sizes: usize) -> (DMatrix<f64>, Vec<Latent>) {
     let (linear, Adjustment { problem, state }) = (fit.linear(), &fit.adjustment);
     let (readings, series) = (state.robot.chain.readings.len(), problem.noise.joint.len());
-    let twists = problem.families.iter().find(|f| f.is_of_twists());
+    let twists = problem.families.iter().find(|f| f.kind == FamilyKind::Twists);
     let mut information = DMatrix::zeros(sizes, sizes);
     let mut add = |a: &Latent, b: &Latent, covariance: f64| {
         let r = f64::from(a.row == b.row) - covariance / (a.sigma * b.sigma);
@@ -116,7 +116,7 @@ pub fn noise_information(fit: &Fit) -> Option<NoiseInformation> {
     };
     let cov = coupled.as_ref().unwrap_or(cov);
     let of_errors = problem.noise.latent_sizes();
-    let twists = problem.families.iter().find(|f| f.is_of_twists());
+    let twists = problem.families.iter().find(|f| f.kind == FamilyKind::Twists);
     let variances: Vec<f64> = of_errors.chain(twists.map(|f| f.factor)).map(|s| s * s).collect();
     let of_twists = variances.len() - usize::from(twists.is_some());
     let (mut information, together) = from_data(fit, cov, variances.len());
