@@ -61,7 +61,7 @@ pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], lim
 }
 
 /// A point that is off by so much less than the farthest may only be drawn along by it.
-const DRAWN_ALONG: f64 = 0.5;
+const DRAWN_ALONG: f64 = 0.8;
 
 /// All points beside the fit of some.
 struct Beside {

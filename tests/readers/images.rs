@@ -102,9 +102,11 @@ fn light_that_is_not_used_is_said() {
     let images = [("images/a.png", ""), ("images/c.png", ""), ("images/dark/1.png", "")];
     let two = folder(&[&[("series.toml", of_both.as_str()), ("images.csv", table)][..], &images].concat());
     assert_eq!(unused(&two), ["/images/dark"]);
-    let of_one = MANIFEST.split("[[camera]]").next().unwrap();
+    let of_one = format!("camera_mount = \"hand\"\n{}", MANIFEST.split("[[camera]]").next().unwrap());
     let joints = "image,j1\na.png,0.1\nc.png,0.2\n";
-    let one = folder(&[&[("series.toml", of_one), ("joints.csv", joints), ("dark/1.png", "")][..], &images].concat());
+    let one = folder(
+        &[&[("series.toml", of_one.as_str()), ("joints.csv", joints), ("dark/1.png", "")][..], &images].concat(),
+    );
     fs::remove_file(one.path().join("images.csv")).unwrap();
     assert_eq!(unused(&one), ["/dark"]);
 }
