@@ -55,7 +55,7 @@ pub use named_poses::{NamedPoses, read_named_poses};
 pub use observation::{Edge, ImageObservations, Observation};
 pub use observation_file::{observations_csv, parse_observations};
 pub use plate::{Aruco, Marker, Plate, ScaleBar};
-pub use plate_file::{parse_plate, plate_csv, plate_toml, read_plate};
+pub use plate_file::{parse_plate, plate_csv, plate_files, plate_toml, read_plate};
 pub use plate_kind::{Ink, Places, PlateKind, Print, Turns};
 pub use plate_turns::PlateTurn;
 pub use point_file::PointRow;

@@ -508,6 +508,20 @@ pub fn plate_toml(plate: &Plate, markers: Option<&str>) -> Result<String> {
     )
 }
 
+/// Names and texts of the files of a plate: plate.toml, and plate.csv where circles have sizes of their own, or where plate.toml alone says other markers.
+///
+/// # Errors
+/// A plate that cannot be written.
+pub fn plate_files(plate: &Plate) -> Result<Vec<(&'static str, String)>> {
+    let has_circles = plate.markers.iter().any(|m| m.outer_radius_m > 0.0);
+    let alone = plate_toml(plate, None)?;
+    let is_told = |read: Plate| read.markers == plate.markers;
+    if !has_circles && parse_plate(Path::new("plate.toml"), &alone, "").is_ok_and(is_told) {
+        return Ok(vec![("plate.toml", alone)]);
+    }
+    Ok(vec![("plate.toml", plate_toml(plate, Some("plate.csv"))?), ("plate.csv", plate_csv(plate))])
+}
+
 /// Text of `plate.csv`; `sigma_m` only where a marker's differs from the plate's tolerance.
 pub fn plate_csv(plate: &Plate) -> String {
     let sigmas = plate.markers.iter().any(|m| m.sigma_m != plate.tolerance_m);

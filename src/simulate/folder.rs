@@ -12,7 +12,7 @@ use super::render::check_drawable;
 use super::world::SimulatedSeries;
 use crate::detect::Picture;
 use crate::error::{Code, Error, Result};
-use crate::series::{observations_csv, plate_csv, plate_toml};
+use crate::series::{observations_csv, plate_files};
 
 /// What stands for the measurements.
 #[derive(Clone, Copy)]
@@ -60,11 +60,8 @@ pub fn write(folder: &Path, series: &SimulatedSeries, content: Content<'_>) -> R
     }
     put(&folder.join("series.toml"), manifest.to_toml()?)?;
     put(&folder.join("joints.csv"), series.stops.to_csv())?;
-    let has_circles = series.plate.markers.iter().any(|m| m.outer_radius_m > 0.0);
-    let has_table = has_circles || series.plate.kind.print().needs_marker_file;
-    put(&folder.join("plate.toml"), plate_toml(&series.plate, has_table.then_some("plate.csv"))?)?;
-    if has_table {
-        put(&folder.join("plate.csv"), plate_csv(&series.plate))?;
+    for (name, text) in plate_files(&series.plate)? {
+        put(&folder.join(name), text)?;
     }
     put(&folder.join("truth.toml"), truth.to_toml()?)
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
-use robotcal::series::{Marker, Plate, PlateKind, ScaleBar, plate_csv, plate_toml, read_plate};
+use robotcal::series::{Marker, Plate, PlateKind, ScaleBar, plate_csv, plate_files, plate_toml, read_plate};
 use robotcal::{Code, Error};
 use tempfile::TempDir;
 
@@ -169,6 +169,15 @@ fn what_is_written_reads_back_the_same() {
         markers: vec![marker(3, 0.0, 0.01, 0.005, 1e-4), marker(12, 0.3, 0.0, 0.0, 3e-5)],
     };
     assert_eq!(plate(&plate_toml(&points, Some("plate.csv")).unwrap(), &plate_csv(&points)), points);
+    let board = Plate::lattice(PlateKind::Chessboard, 5, 4, 0.012, 5e-5);
+    let mut measured = board.clone();
+    measured.markers[3].position_m.z = 1e-4;
+    for (plate_of, has_table) in [(points, true), (measured, true), (board, false)] {
+        let files = plate_files(&plate_of).unwrap();
+        let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
+        assert_eq!(names, &["plate.toml", "plate.csv"][..if has_table { 2 } else { 1 }]);
+        assert_eq!(plate(&files[0].1, files.get(1).map_or("", |(_, text)| text)), plate_of);
+    }
     let coded = plate(CODED, &table("", ""));
     assert_eq!(plate(&plate_toml(&coded, Some("plate.csv")).unwrap(), &plate_csv(&coded)), coded);
     let mut dots = Plate::lattice(PlateKind::CircleGrid, 5, 4, 0.012, 5e-5);

@@ -11,7 +11,7 @@ use crate::error::{Code, Error, Result};
 use crate::output::ResultFolder;
 use crate::output::plate_drawing::{Caption, pdf, png, svg};
 use crate::plan::plate_design::{Sheet, margin_m, quiet_field_m};
-use crate::series::{Plate, parse_plate, plate_csv, plate_toml, regions};
+use crate::series::{Plate, parse_plate, plate_files, regions};
 
 /// Kinds of plates that are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -104,14 +104,13 @@ pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &Bo
     }
     let name = name(args, &plate);
     let caption = Caption { name: name.clone(), sheet };
-    let table = plate.markers.iter().any(|m| m.outer_radius_m > 0.0).then(|| plate_csv(&plate));
-    let mut files = vec![
-        ("plate.toml", plate_toml(&plate, table.as_ref().map(|_| "plate.csv"))?.into_bytes()),
+    let texts = plate_files(&plate)?.into_iter().map(|(name, text)| (name, text.into_bytes()));
+    let drawn = [
         ("plate.pdf", pdf(&plate, &caption)),
         ("plate.svg", svg(&plate, &caption)),
         ("plate.png", png(&plate, &caption, size.dpi)?),
     ];
-    files.extend(table.map(|text| ("plate.csv", text.into_bytes())));
+    let files: Vec<_> = texts.chain(drawn).collect();
     let all: Vec<(String, &[u8])> = files.iter().map(|(file, bytes)| ((*file).to_owned(), bytes.as_slice())).collect();
     place.require_the_same(&["plate.toml", "plate.csv"], &all)?;
     place.write_beside(&all, &[])?;

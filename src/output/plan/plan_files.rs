@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::error::Result;
 use crate::output::text::{as_written, json};
 use crate::plan::{Forecast, Plan, PlanRequest, image_name};
-use crate::series::{AngleUnit, DEFAULT_PLACEMENT, Manifest, SeriesStop, Stops, plate_csv, plate_toml};
+use crate::series::{AngleUnit, DEFAULT_PLACEMENT, Manifest, SeriesStop, Stops, plate_files};
 use crate::urdf::JointKind;
 
 /// Name of the file that lists the others.
@@ -112,14 +112,10 @@ pub fn plan_files(
         tip: Some(chain.tip.clone()),
         ..Manifest::plain(setting.mount, "plate.toml")
     };
-    let circles = setting.plate.markers.iter().any(|m| m.outer_radius_m > 0.0);
     let mut files = more;
     files.insert("joints.csv".into(), stops.to_csv().into_bytes());
     files.insert("series.toml".into(), manifest.to_toml()?.into_bytes());
-    files.insert("plate.toml".into(), plate_toml(&setting.plate, circles.then_some("plate.csv"))?.into_bytes());
-    if circles {
-        files.insert("plate.csv".into(), plate_csv(&setting.plate).into_bytes());
-    }
+    files.extend(plate_files(&setting.plate)?.into_iter().map(|(name, text)| (name.into(), text.into_bytes())));
     let record = record(request, plan, forecast, command, &files);
     files.insert(FILE_NAME.to_owned(), json(&record, FILE_NAME)?);
     Ok(files)

@@ -9,7 +9,7 @@ use crate::identify::SeenImage;
 use crate::output::names::file_parts;
 use crate::output::text::{as_written, json};
 use crate::series::{
-    CirclePoint, Edge, ImageObservations, InputFile, Plate, Series, observations_csv, plate_csv, plate_toml, to_csv,
+    CirclePoint, Edge, ImageObservations, InputFile, Plate, Series, observations_csv, plate_files, to_csv,
 };
 
 /// Name of the file that lists all others.
@@ -67,10 +67,8 @@ pub fn detection_files(images: &[SeenImage], context: &DetectionContext) -> Resu
     if let Some(series) = context.series {
         add("series.toml", manifest(series, images)?);
         add("joints.csv", series.stops.to_csv());
-        let has_circles = context.plate.markers.iter().any(|m| m.outer_radius_m > 0.0);
-        add("plate.toml", plate_toml(context.plate, has_circles.then_some("plate.csv"))?);
-        if has_circles {
-            add("plate.csv", plate_csv(context.plate));
+        for (name, text) in plate_files(context.plate)? {
+            add(name, text);
         }
     }
     let mut names: BTreeSet<String> = files.keys().cloned().collect();
