@@ -154,7 +154,7 @@ pub(super) fn by_frame_and_reflector(
 /// What a fit of points should leave, by the covariance of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedRms {
-    /// From the uncertainty of the model alone, m.
+    /// From the uncertainty of the model and what the judged one lacks of it, m.
     pub model_m: f64,
     /// Upper end of its 95 % interval, m: few directions of the model count at few points.
     pub most_model_m: f64,
@@ -169,7 +169,7 @@ pub struct ExpectedRms {
 /// Expected square of the residual of a point, m^2.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedSquares {
-    /// By the uncertainty of the model alone.
+    /// By the uncertainty of the model and what the judged one lacks of it.
     pub model: f64,
     /// By the noise of every reading.
     pub by_reading: Vec<f64>,
@@ -179,7 +179,7 @@ pub struct ExpectedSquares {
 pub(super) struct Derivatives {
     /// By the robot's columns.
     pub by_model: DMatrix<f64>,
-    /// By the noise of every reading of every point, in its sigmas.
+    /// By the noise of every reading of the point itself, in its sigmas.
     pub by_noise: DMatrix<f64>,
     /// By frame and reflector.
     pub fitted: DMatrix<f64>,
@@ -200,41 +200,66 @@ impl PointFit {
 
     /// Expected RMS of the residuals: the model's errors at the points, less what the fit of frame and reflector takes up.
     ///
-    /// `covariance` is that of the robot's columns (twists, then terms), m and rad; `joint_sigma` that of every reading.
+    /// `covariance` is that of the robot's columns (twists, then terms), m and rad; `joint_sigma` that of every reading. `judged` is what the points
+    /// are judged by where that is another robot, which lacks a part of it.
     pub fn expected(
         &self,
-        robot: &Robot,
+        (robot, judged): (&Robot, Option<&Robot>),
         points: &[MeasuredPoint],
         covariance: &DMatrix<f64>,
         joint_sigma: &[f64],
     ) -> Option<ExpectedRms> {
+        let lacking = match judged {
+            Some(judged) => self.left_by(robot, judged, points)?,
+            None => vec![Vector3::zeros(); points.len()],
+        };
         let d = self.derivatives(robot, points, covariance.nrows(), joint_sigma);
         let normal = SymmetricFactor::new(&held_weakly(d.fitted.transpose() * &d.fitted)).ok()?;
-        let left = |j: &DMatrix<f64>| j - &d.fitted * normal.solve_many(&(d.fitted.transpose() * j));
-        let (model, noise) = (left(&d.by_model), left(&d.by_noise));
+        let model = &d.by_model - &d.fitted * normal.solve_many(&(d.fitted.transpose() * &d.by_model));
         let n = points.len() as f64;
         let squares = product(&model, covariance).component_mul(&model);
-        let of_model = squares.sum() / n;
+        let of_point = |k: usize| squares.rows(3 * k, 3).sum().max(0.0) + lacking[k].norm_squared();
+        let of_model = (0..points.len()).map(of_point).sum::<f64>() / n;
         let mut sums = MeanSquare::new(model.ncols());
-        (0..points.len()).for_each(|k| sums.add(&model.fixed_rows::<3>(3 * k).into_owned(), &Vector3::zeros()));
+        (0..points.len()).for_each(|k| sums.add(&model.fixed_rows::<3>(3 * k).into_owned(), &lacking[k]));
         let [_, most_model_m] = sums.interval_m(covariance, Spread { variance: 0.0, sigma: 0.0 });
         let readings = joint_sigma.len();
-        let own = |k: usize, r: usize| noise.fixed_view::<3, 1>(3 * k, k * readings + r).norm_squared();
-        let of_point = |k: usize| ExpectedSquares {
-            model: squares.rows(3 * k, 3).sum().max(0.0),
-            by_reading: (0..readings).map(|r| own(k, r)).collect(),
+        // The noise of a point moves the frame, too: of its square at the point itself, and of that at all points, which a projection makes less.
+        let of_noise = |k: usize, r: usize| {
+            let own = d.by_noise.fixed_view::<3, 1>(3 * k, r).into_owned();
+            let fitted = d.fitted.fixed_rows::<3>(3 * k);
+            let taken_up = fitted.tr_mul(&own);
+            let moved = normal.solve(&taken_up);
+            let at_all = own.norm_squared() - taken_up.dot(&moved);
+            [(own - fitted * moved).norm_squared(), at_all.max(0.0)]
         };
-        let of_reading =
-            |r: usize| (0..points.len()).map(|k| noise.column(k * readings + r).norm_squared()).sum::<f64>();
-        let by_reading: Vec<f64> = (0..readings).map(|r| of_reading(r) / n).collect();
+        let noise: Vec<Vec<[f64; 2]>> =
+            (0..points.len()).map(|k| (0..readings).map(|r| of_noise(k, r)).collect()).collect();
+        let of_points = noise.iter().enumerate().map(|(k, noise)| ExpectedSquares {
+            model: of_point(k),
+            by_reading: noise.iter().map(|[own, _]| *own).collect(),
+        });
+        let of_points = of_points.collect();
+        let by_reading: Vec<f64> =
+            (0..readings).map(|r| noise.iter().map(|noise| noise[r][1]).sum::<f64>() / n).collect();
         let of_noise: f64 = by_reading.iter().sum();
         Some(ExpectedRms {
             model_m: of_model.max(0.0).sqrt(),
             most_model_m,
             with_joint_noise_m: (of_model + of_noise).max(0.0).sqrt(),
             by_reading,
-            of_points: (0..points.len()).map(of_point).collect(),
+            of_points,
         })
+    }
+
+    /// Where the points of this fit are as a robot has them, less where another puts them once frame and reflector are fitted, m, in the frame of
+    /// the device.
+    fn left_by(&self, robot: &Robot, other: &Robot, points: &[MeasuredPoint]) -> Option<Vec<Vector3<f64>>> {
+        let by_robot = |p: &MeasuredPoint| {
+            let on_tip = robot.base_from_tip(&p.readings).transform(&self.tip_point_m);
+            MeasuredPoint { position_m: self.device_from_base.transform(&on_tip), readings: p.readings.clone() }
+        };
+        Some(fit_points(other, &points.iter().map(by_robot).collect::<Vec<_>>())?.residuals_m)
     }
 
     /// Logarithm of the density of the points under what is stated, frame and reflector unknown (restricted likelihood: of the contrasts
@@ -257,7 +282,7 @@ impl PointFit {
         for (a, b, r) in pairs(points.len(), readings) {
             let apart = (points[a].readings[r] - points[b].readings[r]) / LOCAL_RANGE;
             let variance = f64::from(a == b) * own[r].powi(2) + local[r].powi(2) * (-0.5 * apart * apart).exp();
-            let by = |k: usize| d.by_noise.fixed_view::<3, 1>(3 * k, k * readings + r);
+            let by = |k: usize| d.by_noise.fixed_view::<3, 1>(3 * k, r);
             let mut block = all.fixed_view_mut::<3, 3>(3 * a, 3 * b);
             block += variance * by(a) * by(b).transpose();
         }
@@ -277,12 +302,12 @@ impl PointFit {
     fn derivatives(&self, robot: &Robot, points: &[MeasuredPoint], columns: usize, joint_sigma: &[f64]) -> Derivatives {
         let (n, readings) = (points.len(), joint_sigma.len());
         let mut by_model = DMatrix::zeros(3 * n, columns);
-        let mut by_noise = DMatrix::zeros(3 * n, n * readings);
+        let mut by_noise = DMatrix::zeros(3 * n, readings);
         let mut fitted = DMatrix::zeros(3 * n, 9);
         for (k, p) in points.iter().enumerate() {
             let of_point = self.derivatives_at(robot, p, joint_sigma);
             by_model.view_mut((3 * k, 0), (3, columns)).copy_from(&of_point.by_model);
-            by_noise.view_mut((3 * k, k * readings), (3, readings)).copy_from(&of_point.by_noise);
+            by_noise.view_mut((3 * k, 0), (3, readings)).copy_from(&of_point.by_noise);
             fitted.view_mut((3 * k, 0), (3, 9)).copy_from(&of_point.fitted);
         }
         Derivatives { by_model, by_noise, fitted }

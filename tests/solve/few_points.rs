@@ -26,7 +26,8 @@ fn right_models_miss_points_by_no_more_than_the_interval_says() {
         readings.iter().map(|q| MeasuredPoint { position_m: position_m(q), readings: q.clone() }).collect()
     };
     let points = seen(&nominal);
-    let stated = fit_points(&nominal, &points).unwrap().expected(&nominal, &points, &covariance, &[0.0; 6]).unwrap();
+    let stated =
+        fit_points(&nominal, &points).unwrap().expected((&nominal, None), &points, &covariance, &[0.0; 6]).unwrap();
     let missed: Vec<f64> = (0..WORLDS)
         .map(|_| {
             let mut robot = nominal.clone();

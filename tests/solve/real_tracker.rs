@@ -53,7 +53,7 @@ fn judged(s: &Solution, points: &[MeasuredPoint]) -> Judged {
     Judged {
         best: noises.into_iter().flatten().fold(f64::NEG_INFINITY, f64::max),
         rms_mm: 1e3 * fit.rms_m,
-        expected_mm: 1e3 * fit.expected(&robot, points, &covariance, &together).unwrap().with_joint_noise_m,
+        expected_mm: 1e3 * fit.expected((&robot, None), points, &covariance, &together).unwrap().with_joint_noise_m,
         log_density: [density([&together, &none]), density([own, local])],
     }
 }

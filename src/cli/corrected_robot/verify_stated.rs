@@ -96,9 +96,17 @@ impl Stated {
         let [at_stops_m, most_m] = self.scatter_m(&by_readings(&self.found.robot, &stops), stops.len());
         let stated = self.record.flange?;
         let scatter_m = stated.scatter_m;
-        let widening = stated.intervals.map_or(NORMAL_95, |i| i.model_m[1] / stated.model_m);
-        let expected = self
-            .expectation(([model_m, widening * model_m], lacking_m), [scatter_m, scatter_m + (most_m - at_stops_m)])?;
+        let widening = stated.intervals.map_or(NORMAL_95, |intervals| match &self.part {
+            None => intervals.model_m[1] / stated.model_m,
+            // Errors of the model go along with what the part lacks, or against it.
+            Some(_) => {
+                let alone = stated.alone_m.zip(intervals.alone_m).map_or(0.0, |(m, [_, most_m])| most_m / m);
+                f64::max(alone, intervals.urdf_m[1] / stated.urdf_m)
+            }
+        });
+        let model_m = model_m.hypot(lacking_m);
+        let expected =
+            self.expectation([model_m, widening * model_m], [scatter_m, scatter_m + (most_m - at_stops_m)])?;
         // What was found for images that the fit had not seen is of this kind.
         let held_out_m = 1e-3 * self.record.accuracy.calibrated.rms_mm;
         let most_m = if held_out_m.is_finite() { expected.most_m.max(held_out_m) } else { expected.most_m };
@@ -110,18 +118,14 @@ impl Stated {
         let known = self.found.known_robot(None).ok()?;
         let robot = &self.found.robot;
         let unit = vec![1.0; self.found.joint_sigma.len()];
-        let left = fit_points(robot, points)?.expected(robot, points, known.covariance(), &unit)?;
+        let judged = (robot, self.part.as_ref());
+        let left = fit_points(robot, points)?.expected(judged, points, known.covariance(), &unit)?;
         let backlash = self.backlash_m2(&left.by_reading, known.covariance());
         let scatter_m = self.scatter_m(&left.by_reading, points.len()).map(|m| (m * m + backlash).sqrt());
-        let lacking_m = self.part.as_ref().map_or(Some(0.0), |part| {
-            let on_tip = fit_points(robot, points)?.tip_point_m;
-            apart_m([robot, part], &on_tip, points.iter().map(|p| p.readings.as_slice()))
-        });
-        let lacking_m = lacking_m?;
-        let expected = self.expectation(([left.model_m, left.most_model_m], lacking_m), scatter_m)?;
+        let expected = self.expectation([left.model_m, left.most_model_m], scatter_m)?;
         let each = left.of_points.iter().map(|point| {
             let of_noise = self.scatter_m2(&point.by_reading) + self.backlash_m2(&point.by_reading, known.covariance());
-            (point.model + of_noise + lacking_m.powi(2) + 3.0 * device_m.powi(2)).sqrt()
+            (point.model + of_noise + 3.0 * device_m.powi(2)).sqrt()
         });
         let each_m = each.collect();
         // Of so many coordinates, less what frame and reflector take up.
@@ -166,11 +170,10 @@ impl Stated {
         squares.sum()
     }
 
-    /// Of the errors of the model and of the scatter of single stops, each with the upper end of its 95 % interval, and of what a part of the
-    /// model lacks.
-    fn expectation(&self, (model_m, lacking_m): ([f64; 2], f64), scatter_m: [f64; 2]) -> Option<Expectation> {
+    /// Of the errors of the model, with what a part of it lacks, and of the scatter of single stops, each with the upper end of its 95 % interval.
+    fn expectation(&self, model_m: [f64; 2], scatter_m: [f64; 2]) -> Option<Expectation> {
         self.record.flange?;
-        let [rms_m, most_m] = [0, 1].map(|k| model_m[k].hypot(scatter_m[k]).hypot(lacking_m));
+        let [rms_m, most_m] = [0, 1].map(|k| model_m[k].hypot(scatter_m[k]));
         (rms_m > 0.0 && most_m.is_finite()).then_some(Expectation { rms_m, most_m })
     }
 
