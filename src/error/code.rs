@@ -174,7 +174,7 @@ codes! {
         SeriesDisagree "series_disagree" "series that share robot or camera contradict each other",
         ImageNotThere "image_not_there" "the file of an image that a table names is missing",
         ImageUnlisted "image_unlisted" "an image that no row names is not used",
-        MeasurementDuplicate "measurement_duplicate" "measurements of a tracker or of contacts are those of another series to the last digit, and are left out",
+        MeasurementDuplicate "measurement_duplicate" "measurements of a tracker or of contacts are written again, in the same series or another, to the last digit, and are left out",
         ImageDuplicate "image_duplicate" "an image shows exactly what another one shows, and is left out",
         ImageExcluded "image_excluded" "an image is left out because the caller does not want it",
         MarkersTooFew "markers_too_few" "an image shows fewer markers than a pose needs, and is left out",

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
 use crate::error::{Code, Error, Notice, Result};
-use crate::problem::{Exposures, ImageRejection, MeasuredSeries, MeasuredStop, SeenBody, Shared};
+use crate::problem::{BodySeen, Exposures, ImageRejection, MeasuredSeries, MeasuredStop, SeenBody, Shared};
 use crate::series::{InputFile, Plate, Series};
 
 /// Whose pictures a series has.
@@ -33,7 +33,7 @@ struct Repeated {
 }
 
 /// Leaves out images whose picture is that of an image of a series before, taken of the same plate with the same readings, in whatever format, and what trackers and
-/// contacts measured in a series before with the same readings. `views` are the series as their files say, in the order of `all`; `images` are the
+/// contacts measured before with the same readings, in the same series or another. `views` are the series as their files say, in the order of `all`; `images` are the
 /// hashes of their images. Images without a picture are compared later, with those of their own series.
 ///
 /// # Errors
@@ -51,7 +51,7 @@ pub(super) fn leave_out_repeated(
     leave_out(&shown, all)
 }
 
-/// Leaves out what trackers and contacts measured in a series before with the same readings, to the last digit; of series without images.
+/// Leaves out what trackers and contacts measured before with the same readings, to the last digit; of series without images.
 ///
 /// # Errors
 /// A series all of whose measurements are in those before it.
@@ -60,7 +60,7 @@ pub fn leave_out_repeated_bodies(all: &mut [MeasuredSeries]) -> Result<Vec<Notic
 }
 
 fn leave_out(shown: &[Shown], all: &mut [MeasuredSeries]) -> Result<Vec<Notice>> {
-    let mut notices = Vec::new();
+    let mut notices: Vec<Notice> = all.iter_mut().filter_map(leave_out_own).collect();
     for k in 1..all.len() {
         let (before, rest) = all.split_at_mut(k);
         let repeated = Repeated::of(&rest[0], k, before, shown);
@@ -70,6 +70,31 @@ fn leave_out(shown: &[Shown], all: &mut [MeasuredSeries]) -> Result<Vec<Notice>>
         notices.extend(repeated.leave_out(&mut rest[0], before));
     }
     Ok(notices)
+}
+
+/// Leaves out what a series itself has before, of the same instrument and body with the same readings: nothing was measured again.
+fn leave_out_own(own: &mut MeasuredSeries) -> Option<Notice> {
+    let mut known: HashMap<_, Vec<BodySeen>> = HashMap::new();
+    let count = own.bodies.len();
+    let stops = &own.stops;
+    own.bodies.retain(|body| {
+        let Some(readings) = key(&stops[body.stop]) else { return true };
+        let of_same = known.entry((readings, body.instrument.clone(), body.body.clone())).or_default();
+        let is_new = !of_same.contains(&body.seen);
+        of_same.push(body.seen);
+        is_new
+    });
+    let left_out = count - own.bodies.len();
+    (left_out > 0).then(|| {
+        Notice::new(
+            Code::MeasurementDuplicate,
+            format!("series {}", own.name),
+            format!(
+                "{left_out} measurements of trackers or contacts are, with their readings, earlier ones of the same series to the last digit: they are counted once"
+            ),
+            "give each once, and readings with all their digits",
+        )
+    })
 }
 
 fn key(stop: &MeasuredStop) -> Option<Vec<u64>> {
@@ -211,7 +236,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::problem::{BodySeen, InstrumentKind, SeenLength};
+    use crate::problem::{InstrumentKind, SeenLength};
     use crate::series::{Edge, Observation, PlateKind};
 
     fn stop(row: usize) -> MeasuredStop {
@@ -301,6 +326,11 @@ mod tests {
             all[1].bodies.iter().map(|b| (b.stop, b.instrument.as_str(), b.body.as_str())).collect();
         assert_eq!(left, [(4, "a", "a ball"), (5, "a", "a ball")]);
         assert!(all[1].lengths.is_empty() && all[0].bodies.len() == 4 && all[0].lengths.len() == 1);
+
+        // A row that was copied within its table.
+        let mut copied = [tracked("a", &[0, 1, 0, 2, 0])];
+        assert_eq!(codes(&leave_out_repeated_bodies(&mut copied).unwrap()), [Code::MeasurementDuplicate]);
+        assert_eq!(copied[0].bodies.iter().map(|b| b.stop).collect::<Vec<_>>(), [0, 1, 3]);
 
         // Other readings, or another place: another measurement.
         let mut others = [a(), tracked("b", &[0, 1, 2, 3])];
