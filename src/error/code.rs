@@ -260,6 +260,7 @@ codes! {
         TargetsTooFew "targets_too_few" "too few targets tell of an error",
     }
     Input "Corrected programs" {
+        PosesKept "poses_kept" "poses of a table stay as they are beside joints that are corrected",
         TargetsLeft "targets_left" "targets stay as they are; their reasons are counted",
         TargetsMissing "targets_missing" "no target is found in the programs",
         ProgramWritten "program_written" "targets of a program were changed; the record has the hash of its bytes",
@@ -271,6 +272,7 @@ codes! {
         NominalIsControllers "nominal_is_controllers" "the nominal model is the one in the controller",
         NominalDiffers "nominal_differs" "the nominal model is not the one in the controller",
         TaughtWithOtherFrames "taught_with_other_frames" "joints and poses were taught with another tool or base",
+        ControllerBase "controller_base" "poses of URScript in another base than that of the controller",
         FramesDiffer "frames_differ" "base or tool are not those of the program",
         DisplacedOrientation "displaced_orientation" "displaced targets are turned as the points that they start from",
         ExpectedError "expected_error" "how far the tool is expected from where the program meant it",

@@ -300,3 +300,51 @@ fn descriptions_that_correct_nothing_or_the_wrong_way_are_named() {
         assert_eq!(weight(&run, Code::CompensationNotGiven), note, "{}", run.said());
     }
 }
+
+/// ur_description has the frame of the controller beside `base_link`, turned by half a turn.
+#[test]
+fn poses_of_urscript_in_another_base_than_the_controllers_are_named() {
+    let cell = Cell::ur(126);
+    let frame = "<link name=\"base\"/><joint name=\"base_link-base\" type=\"fixed\"><parent link=\"base_link\"/><child link=\"base\"/>\
+        <origin xyz=\"0 0 0\" rpy=\"0 0 3.141592653589793\"/></joint></robot>";
+    let described = |name: &str, path: &Path| {
+        let text = std::fs::read_to_string(path).unwrap().replace("</robot>", frame);
+        cell.write(name, text.as_bytes())
+    };
+    let [nominal, real] = [described("n.urdf", &cell.nominal_urdf), described("r.urdf", &cell.real_urdf)];
+    let pose = "def p():\n  movej(p[0.6,0.2,0.4,0,3.1,0], a=1)\nend\n";
+    let joints = "def p():\n  movej([0.1,-1.2,1.5,-1.8,-1.5,0.3], a=1)\nend\n";
+    for (text, base, named) in
+        [(pose, None, Some("gate")), (pose, Some("base"), None), (pose, Some("base_link"), None), (joints, None, None)]
+    {
+        let file = cell.write("p.script", text.as_bytes());
+        let out = cell.folder.path().join("out");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_robotcal"));
+        command.arg("compensate").arg(&file).arg("--out").arg(&out);
+        command.arg("--nominal").arg(&nominal).arg("--urdf").arg(&real);
+        command.args(["--frames", "nominal", "--tip", "tool0", "--start", "0.1,-1.2,1.5,-1.8,-1.5,0.3"]);
+        command.args(base.map(|base| ["--base", base]).into_iter().flatten());
+        let run = Run { output: command.output().unwrap(), out, programs: Vec::new() };
+        assert_eq!(weight(&run, Code::ControllerBase).as_deref(), named, "{base:?} {}", run.said());
+    }
+}
+
+/// The joint columns are corrected, and the pose columns are not.
+#[test]
+fn poses_beside_corrected_joints_are_said_to_be_kept() {
+    let mut cell = Cell::kuka(127);
+    let q = cell.readings();
+    let pose = cell.nominal.base_from_tip(&q);
+    let [x, y, z] = pose.xyz();
+    let turn = nalgebra::UnitQuaternion::from_matrix(&pose.rotation);
+    let header = format!("x_m,y_m,z_m,qx,qy,qz,qw,{}", cell.nominal.chain.readings.join(","));
+    let cells = [x, y, z, turn.i, turn.j, turn.k, turn.w].into_iter().chain(q.iter().copied());
+    let row: Vec<String> = cells.map(|v| format!("{v:.9}")).collect();
+    let file = cell.write("t.csv", format!("{header}\n{}\n", row.join(",")).as_bytes());
+    let run = cell.compensate(&[&file], &["--joint-unit", "rad"]);
+    assert_eq!(weight(&run, Code::PosesKept).as_deref(), Some("note"), "{}", run.said());
+    let joints = format!("{}\n{}\n", cell.nominal.chain.readings.join(","), row[7..].join(","));
+    let file = cell.write("t.csv", joints.as_bytes());
+    let run = cell.compensate(&[&file], &["--joint-unit", "rad"]);
+    assert_eq!(weight(&run, Code::PosesKept), None);
+}

@@ -9,6 +9,8 @@ use clap::{Args, ValueEnum};
 
 use super::compensate_frames::{Choice, Side, Sides, known_error};
 use super::compensate_models::{corrected_already, equal, exchanged, not_given};
+use super::controller_base::controller_base;
+use crate::assess::Limits;
 use crate::cli::Verdict;
 use crate::cli::flags::joint_table::Unit;
 use crate::cli::flags::robot::noted_chain;
@@ -156,6 +158,7 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     let left = done.left(&program);
     let (expected, meant) = (choice.expected(&sides, &framed, &program, &done)?, choice.meant());
     let mut findings = model_findings(args, nominal, &models, &sides)?;
+    findings.extend(in_other_base(args, nominal, (language, &program), &controller.chain)?);
     let said = expected.as_deref().map_err(|why| why.as_str());
     findings.extend(program_findings(args, (&program, &done, &left), (said, &meant)));
     let report = corrections::table(&program, &done, expected.as_deref().ok(), &controller.chain);
@@ -324,10 +327,26 @@ fn program_findings(
     (read.filter_map(|(path, file)| corrected_already(path, file, args.from.is_some())))
         .chain(corrections::nominal_findings(program, done))
         .chain(corrections::displaced_finding(program, done))
+        .chain(corrections::poses_kept_finding(program, done))
         .chain(corrections::expected_findings(expected, done, meant, &subject))
         .chain(corrections::left_finding(left.iter().map(|l| l.why.reason.name()), &subject))
         .chain(corrections::missing_finding(program, left, &subject))
         .collect()
+}
+
+/// Poses of URScript where no base is named, and the controller computes in another one than that of the chain.
+fn in_other_base(
+    args: &CompensateArgs,
+    nominal: &Path,
+    (language, program): (Language, &Program),
+    chain: &Chain,
+) -> Result<Option<FileFinding>> {
+    let has_poses = program.targets.iter().any(|target| matches!(target.kind, TargetKind::Pose(_)));
+    if args.base.is_some() || language != Language::UrScript || !has_poses {
+        return Ok(None);
+    }
+    let poses = (Weight::Gate, "poses are read");
+    Ok(controller_base(&urdf::read(nominal)?, [&chain.base, &chain.tip], &Limits::default(), poses))
 }
 
 /// The link of the chain on which `--base` is fixed, where it does not lie in the chain itself.

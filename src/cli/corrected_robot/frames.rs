@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::controller_base::controller_base;
 use super::frames_text::text;
 use super::zeros::{ReadingsArgs, Zeros};
 use crate::assess::Limits;
@@ -15,6 +16,7 @@ use crate::diagnose::{Mistake, Weight};
 use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, Seen, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
+
 use crate::identify::{leave_out_repeated_bodies, measure_bodies, mirror_image, touch_mistake};
 use crate::output::corrections::FileFinding;
 use crate::output::frame_files::{self, Frames, Named};
@@ -110,6 +112,10 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     findings.extend(mirrored.map(|joints| mirror_image_fits(&joints, &subject)));
     findings.extend(from_below(robot.exported(), (&fitted, &touches), &found.limits, &subject));
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
+    let poses = (Weight::Note, "robotcal_frames.script has the plane");
+    let of_base = [record.robot.base.as_str(), record.robot.tip.as_str()];
+    let in_own = args.base.is_none() && frames.work.is_some();
+    findings.extend(in_own.then(|| controller_base(&description, of_base, &found.limits, poses)).flatten());
     let is_carried = carried(robot.exported(), frames.work.as_ref().map(|w| w.name.as_str()), &subject);
     let work = frames.work.clone().filter(|_| is_carried.is_none());
     let of_controller = Frames { work, ..frames.clone() };

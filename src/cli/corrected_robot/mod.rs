@@ -8,6 +8,7 @@
 pub mod compensate;
 mod compensate_frames;
 mod compensate_models;
+mod controller_base;
 pub mod frames;
 mod frames_text;
 pub mod verify;

@@ -14,7 +14,7 @@ use crate::geom::Pose;
 use crate::model::robot::{Posture, Robot};
 use crate::output::restore::FoundModel;
 use crate::programs::compensate::{Compensated, RESIDUAL};
-use crate::programs::{KnownError, Left, Program, TargetKind, TargetOutcome};
+use crate::programs::{KnownError, Left, Program, Target, TargetKind, TargetOutcome};
 use crate::urdf::Chain;
 
 /// Name of the table of corrections.
@@ -114,6 +114,22 @@ pub fn displaced_finding(program: &Program, done: &Compensated) -> Option<FileFi
         subject: program.files.first().map_or_else(String::new, |f| f.name.clone()),
         quantities: numbers([("targets", mrad.len() as f64), ("max_mrad", max_mrad)]),
         text: format!("{} displaced targets are exact in place and turned as the points that they start from: {max_mrad:.4} mrad at most are left (RelTool can turn, Offs cannot)", mrad.len()),
+    })
+}
+
+/// Poses of a table: the joints beside them are corrected, and they are not.
+pub fn poses_kept_finding(program: &Program, done: &Compensated) -> Option<FileFinding> {
+    let is_beside = |(target, outcome): &(&Target, &TargetOutcome)| {
+        let is_done = matches!(outcome, TargetOutcome::Done(_));
+        is_done && matches!(&target.kind, TargetKind::Pose(pose) if pose.joint_fields.iter().any(Option::is_some))
+    };
+    let count = program.targets.iter().zip(&done.outcomes).filter(is_beside).count();
+    (count > 0).then(|| FileFinding {
+        code: Code::PosesKept,
+        weight: Weight::Note,
+        subject: program.files.first().map_or_else(String::new, |f| f.name.clone()),
+        quantities: numbers([("targets", count as f64)]),
+        text: format!("the joints of {count} targets are corrected, and the poses beside them are as they were, which say where the tool is to be: send the joints"),
     })
 }
 
