@@ -35,9 +35,18 @@ impl OddPoints {
 /// together with what the model is stated to miss at the point, m (`stated_m`, of every point; empty where nothing is stated).
 pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], limits: &Limits) -> Option<OddPoints> {
     let beside = |odd: &[usize]| Beside::these(robot, points, odd, (stated_m, limits));
-    // They only grow in number, and only fall then, so that it ends.
     let mut odd: Vec<usize> = Vec::new();
     let mut fit = beside(&odd)?;
+    // Of few points one draws the fit along, and makes much usual: it may be seen only once it is left out, and counts then where it is wrong for sure.
+    let is_drawn = fit.beyond.is_empty();
+    if is_drawn {
+        odd.push(fit.farthest()?);
+        fit = beside(&odd)?;
+        if !fit.beyond.contains(&odd[0]) {
+            return None;
+        }
+    }
+    // They only grow in number, and only fall then, so that it ends.
     loop {
         let all = fit.with_the_farthest(&odd);
         if all.len() * limits.touches_for_one_left_out > points.len() {
@@ -57,6 +66,9 @@ pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], lim
     }
     let off_m = odd.iter().map(|k| fit.off_m[*k]).collect();
     let wrong = wrong_points(robot, points, (&odd, &fit.without), limits).unwrap_or_default();
+    if is_drawn && wrong != odd {
+        return None;
+    }
     Some(OddPoints { points: odd, off_m, without: fit.without, wrong })
 }
 
@@ -91,6 +103,11 @@ impl Beside {
         let off_m: Vec<f64> = points.iter().map(|p| without.residual_m(robot, p).norm()).collect();
         let beyond = (0..points.len()).filter(|k| off_m[*k] > bound(*k)).collect();
         Some(Self { without, off_m, beyond })
+    }
+
+    /// The point that is farthest off.
+    fn farthest(&self) -> Option<usize> {
+        (0..self.off_m.len()).max_by(|a, b| self.off_m[*a].total_cmp(&self.off_m[*b]))
     }
 
     /// What was left out, and of the others beyond those that no other draws along by far more than they are off.

@@ -312,7 +312,7 @@ fn poses_of_urscript_in_another_base_than_the_controllers_are_named() {
         cell.write(name, text.as_bytes())
     };
     let [nominal, real] = [described("n.urdf", &cell.nominal_urdf), described("r.urdf", &cell.real_urdf)];
-    let pose = "def p():\n  movej(p[0.6,0.2,0.4,0,3.1,0], a=1)\nend\n";
+    let pose = "def p():\n  set_tcp(p[0,0,0,0,0,0])\n  movej(p[0.6,0.2,0.4,0,3.1,0], a=1)\nend\n";
     let joints = "def p():\n  movej([0.1,-1.2,1.5,-1.8,-1.5,0.3], a=1)\nend\n";
     for (text, base, named) in
         [(pose, None, Some("gate")), (pose, Some("base"), None), (pose, Some("base_link"), None), (joints, None, None)]

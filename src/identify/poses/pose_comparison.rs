@@ -8,6 +8,10 @@
 //! ```
 //!
 //! Gauss-Newton with `dr = -Ad(B_i Y^-1)^-1 x + Ad(Y) y + (R_A' t_A, 0) s`; the two sigmas follow the residuals.
+//!
+//! What the poses have in common, as the error of a camera, frames and scale take up. With `S` the covariance of all poses together, `J` the derivatives,
+//! `G = (J' W J)^-1 J' W` and `C` the diagonal blocks of `S`, the residuals have the covariance `(1 - J G) S (1 - J G)'`, and the sum of `r' C^-1 r` is expected to be
+//! `tr(C^-1 S) - 2 tr(C^-1 J G S) + tr(C^-1 J G S G' J')`.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
@@ -54,25 +58,27 @@ pub struct PoseComparison {
     pub rms: [f64; 2],
     /// Size of the plate by the poses found over that by the other source, less one.
     pub relative_scale: f64,
-    /// Mean of `e' C^-1 e / 6` with the stated covariances: 1 where the other source is exact and what is stated is true.
+    /// Sum of `r' C^-1 r` by the stated covariances over what is expected of it: 1 where the other source is exact and what is stated is true.
     pub normalised: f64,
 }
 
 /// One pose of both.
 struct Pair {
     image: String,
+    /// Its index.
+    index: usize,
     own: Pose,
     covariance: Matrix6<f64>,
     other: Pose,
 }
 
 impl Pair {
-    /// Square of a twist between both over the covariance, per component.
-    fn normalised(&self, twist: &Vector6<f64>) -> Option<f64> {
+    /// Inverse of the covariance.
+    fn information(&self) -> Option<Matrix6<f64>> {
         let unit = self.covariance.diagonal().map(|v| v.max(f64::MIN_POSITIVE).sqrt());
         let scaled = Matrix6::from_fn(|i, k| self.covariance[(i, k)] / unit[i] / unit[k]);
-        let e = twist.component_div(&unit);
-        Some(e.dot(&scaled.cholesky()?.solve(&e)) / 6.0)
+        let inverse = scaled.cholesky()?.inverse();
+        Some(Matrix6::from_fn(|i, k| inverse[(i, k)] / unit[i] / unit[k]))
     }
 }
 
@@ -80,11 +86,12 @@ impl Pair {
 fn pairs(found: &StandAlone, others: &[(String, Pose)]) -> Vec<Pair> {
     let stem = |name: &str| name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned();
     (found.fit.problem.images.iter().zip(&found.free_poses.poses))
-        .filter_map(|(image, pose)| {
+        .enumerate()
+        .filter_map(|(index, (image, pose))| {
             let placed = &pose.as_ref()?.in_frame;
             let (_, other) = others.iter().find(|(n, _)| *n == image.name || *n == stem(&image.name))?;
             let (own, covariance) = (placed.plate_from_camera, placed.covariance);
-            Some(Pair { image: image.name.clone(), own, covariance, other: *other })
+            Some(Pair { image: image.name.clone(), index, own, covariance, other: *other })
         })
         .collect()
 }
@@ -114,21 +121,11 @@ pub fn compare_poses(
         Error::new(Code::FitUndetermined, place, what, "give poses that are turned about two axes at least")
     })?;
     let (mut scale, mut sigmas) = (0.0, [FIRST_M_PER_RAD, 1.0]);
+    let unknowns = if body == OtherBody::Camera { 7 } else { 13 };
     for _ in 0..ROUNDS {
-        let unknowns = if body == OtherBody::Camera { 7 } else { 13 };
-        let mut n = DMatrix::<f64>::zeros(unknowns, unknowns);
-        let mut b = DVector::<f64>::zeros(unknowns);
-        for pair in &pairs {
-            let (r, j) = equation(pair, (&x, &y, scale), unknowns);
-            let weight = DVector::from_fn(6, |k, _| sigmas[k / 3].powi(-2));
-            let weighted = DMatrix::from_diagonal(&weight) * &j;
-            n += j.tr_mul(&weighted);
-            b -= weighted.tr_mul(&r);
-        }
-        let size = n.diagonal();
-        (0..unknowns).for_each(|k| n[(k, k)] += HELD * size[k]);
-        let Ok(factor) = SymmetricFactor::new(&n) else { break };
-        let step = factor.solve(&b);
+        let equations: Vec<Equation> = pairs.iter().map(|pair| equation(pair, (&x, &y, scale), unknowns)).collect();
+        let Some(gain) = gain(&equations, sigmas) else { break };
+        let step = -equations.iter().zip(&gain).map(|((r, _), gain)| gain * r).sum::<DVector<f64>>();
         x = x.perturbed(&step.fixed_rows::<6>(0).into_owned());
         scale += step[6];
         if unknowns > 7 {
@@ -137,10 +134,59 @@ pub fn compare_poses(
         sigmas = rms(pairs.iter().map(|p| residual(p, (&x, &y, scale)))).map(|s| s.max(f64::MIN_POSITIVE.sqrt()));
     }
     let twists: Vec<Vector6<f64>> = pairs.iter().map(|p| residual(p, (&x, &y, scale))).collect();
-    let normalised = pairs.iter().zip(&twists).filter_map(|(p, e)| p.normalised(e)).sum::<f64>() / pairs.len() as f64;
+    let equations: Vec<Equation> = pairs.iter().map(|pair| equation(pair, (&x, &y, scale), unknowns)).collect();
+    let together = found.covariance_together()?;
+    let expected =
+        gain(&equations, sigmas).and_then(|gain| expected_squares(&pairs, &equations, &gain, together.as_ref()));
+    let squares = pairs.iter().zip(&twists).filter_map(|(p, e)| Some(e.dot(&(p.information()? * e)))).sum::<f64>();
+    let normalised = expected.map_or(f64::NAN, |expected| squares / expected);
     let rms = rms(twists.iter().copied());
     let differences = pairs.into_iter().zip(twists).map(|(p, twist)| PoseDifference { image: p.image, twist });
     Ok(PoseComparison { differences: differences.collect(), rms, relative_scale: scale, normalised })
+}
+
+/// Residual of a pose, and its derivative by the unknowns.
+type Equation = (DVector<f64>, DMatrix<f64>);
+
+/// By how much the residual of each pose moves the unknowns, `(J' W J)^-1 J_k' W`; `None` where they are not told.
+fn gain(equations: &[Equation], sigmas: [f64; 2]) -> Option<Vec<DMatrix<f64>>> {
+    let weight = DMatrix::from_diagonal(&DVector::from_fn(6, |k, _| sigmas[k / 3].powi(-2)));
+    let weighted: Vec<DMatrix<f64>> = equations.iter().map(|(_, j)| j.tr_mul(&weight)).collect();
+    let mut n = weighted.iter().zip(equations).map(|(weighted, (_, j))| weighted * j).sum::<DMatrix<f64>>();
+    let size = n.diagonal();
+    (0..n.nrows()).for_each(|k| n[(k, k)] += HELD * size[k]);
+    let factor = SymmetricFactor::new(&n).ok()?;
+    Some(weighted.iter().map(|weighted| factor.solve_many(weighted)).collect())
+}
+
+fn dynamic(m: &Matrix6<f64>) -> DMatrix<f64> {
+    DMatrix::from_column_slice(6, 6, m.as_slice())
+}
+
+/// What the sum of `r' C^-1 r` is expected to be by the covariance of the poses `together`, of these images; of very many poses, by that of each.
+fn expected_squares(
+    pairs: &[Pair],
+    equations: &[Equation],
+    gain: &[DMatrix<f64>],
+    together: Option<&(Vec<usize>, DMatrix<f64>)>,
+) -> Option<f64> {
+    let row = |pair: &Pair| together?.0.iter().position(|image| *image == pair.index);
+    let rows: Vec<Option<usize>> = pairs.iter().map(row).collect();
+    let block = |a: usize, b: usize| match together.zip(rows[a].zip(rows[b])) {
+        Some(((_, all), (row, column))) => all.view((6 * row, 6 * column), (6, 6)).into_owned(),
+        None if a == b => dynamic(&pairs[a].covariance),
+        None => DMatrix::zeros(6, 6),
+    };
+    let moved = |b: usize| -> DMatrix<f64> { gain.iter().enumerate().map(|(a, gain)| gain * block(a, b)).sum() };
+    let moved: Vec<DMatrix<f64>> = (0..pairs.len()).map(moved).collect();
+    let of_unknowns: DMatrix<f64> = moved.iter().zip(gain).map(|(moved, gain)| moved * gain.transpose()).sum();
+    let of_pose = |(k, pair): (usize, &Pair)| {
+        let (information, j) = (dynamic(&pair.information()?), &equations[k].1);
+        let own = (&information * block(k, k)).trace();
+        let taken_up = (&information * (j * &moved[k])).trace();
+        Some(own - 2.0 * taken_up + (information * (j * &of_unknowns * j.transpose())).trace())
+    };
+    Some(pairs.iter().enumerate().filter_map(of_pose).sum()).filter(|sum: &f64| *sum > 0.0)
 }
 
 fn rms(twists: impl Iterator<Item = Vector6<f64>>) -> [f64; 2] {
@@ -171,7 +217,7 @@ fn residual(pair: &Pair, (x, y, scale): (&Pose, &Pose, f64)) -> Vector6<f64> {
 }
 
 /// Residual, and its derivative by `x`, `s` and `y`.
-fn equation(pair: &Pair, at: (&Pose, &Pose, f64), unknowns: usize) -> (DVector<f64>, DMatrix<f64>) {
+fn equation(pair: &Pair, at: (&Pose, &Pose, f64), unknowns: usize) -> Equation {
     let (_, y, _) = at;
     let r = residual(pair, at);
     let mut j = DMatrix::zeros(6, unknowns);
@@ -203,7 +249,7 @@ mod tests {
                 let own = pose(f64::from(k));
                 let scaled = Pose::new(own.rotation, own.translation / (1.0 + scale));
                 let other = x.inverse() * scaled * *y;
-                Pair { image: format!("{k}"), own, covariance: Matrix6::identity(), other }
+                Pair { image: format!("{k}"), index: k as usize, own, covariance: Matrix6::identity(), other }
             })
             .collect()
     }
@@ -241,5 +287,22 @@ mod tests {
         let all = pairs(&x, &y, 0.0);
         let (found_x, found_y) = start(&all, OtherBody::Unknown).unwrap();
         assert!(found_x.distance(&x).0 < 1e-6 && found_y.distance(&y).1 < 1e-6);
+    }
+
+    /// Poses whose errors are half common to all, as those of a camera are.
+    #[test]
+    fn what_frames_take_up_of_common_errors_is_expected() {
+        let (x, y) = (Pose::identity(), Pose::exp(&Vector6::new(0.05, 0.0, 0.1, 0.1, 0.2, -0.3)));
+        let all = pairs(&x, &y, 0.0);
+        let together = DMatrix::from_fn(48, 48, |i, k| 1e-6 * (f64::from(i == k) + f64::from(i % 6 == k % 6)));
+        let known: Vec<Pair> = all.into_iter().map(|p| Pair { covariance: Matrix6::identity() * 2e-6, ..p }).collect();
+        let equations: Vec<Equation> = known.iter().map(|p| equation(p, (&x, &y, 0.0), 13)).collect();
+        let gain = gain(&equations, [1.0, 1.0]).unwrap();
+        let expected = |together| expected_squares(&known, &equations, &gain, together).unwrap();
+        let together = ((0..8).collect(), together);
+        let own = expected(Some(&together));
+        // `(1 - J G)` is a projection here: it leaves 35 of 48 directions, and nothing of six that `Y` takes up whole.
+        assert!((own - 35.0 / 2.0).abs() < 1e-3, "{own}");
+        assert!((expected(None) - 35.0).abs() < 1e-3);
     }
 }
