@@ -12,39 +12,38 @@ use super::hold_out::{MOST_STOPS, folds};
 use super::limits::Limits;
 use crate::geom::skew;
 use crate::linalg::product;
-use crate::solve::{Covariance, LinearProblem, LinearisedAdjustment};
+use crate::solve::{LinearProblem, LinearisedAdjustment, Parts};
 
 /// RMS distance by which the markers of some images are expected to be missed where [`super::hold_out`] holds these out, mm, by the index of the image.
 /// Images whose fold leaves the model undetermined are not in it.
 pub fn expected_mm(fit: LinearProblem, images: &[usize], limits: &Limits) -> BTreeMap<usize, f64> {
     let some = fit.some_stops(MOST_STOPS, MOST_STOPS);
     let fit = some.as_ref().map_or(fit, LinearisedAdjustment::linear);
-    let mut expected = BTreeMap::new();
-    for fold in folds(&fit.adjustment.problem, limits).unwrap_or_default() {
-        let asked: Vec<usize> = fold.iter().copied().filter(|i| images.contains(i)).collect();
-        if asked.is_empty() {
-            continue;
-        }
-        let Ok(left_open) = fit.without_images(&fold).linear().covariance() else { continue };
-        expected.extend(asked.into_iter().filter_map(|i| Some((i, 1e3 * of_image(fit, &left_open, i)?))));
-    }
-    expected
+    let problem = &fit.adjustment.problem;
+    let is_asked = |fold: &Vec<usize>| fold.iter().any(|i| images.contains(i));
+    let folds: Vec<Vec<usize>> = folds(problem, limits).into_iter().flatten().filter(is_asked).collect();
+    let parts = Parts::of(fit, &folds);
+    let of_fold = |(k, fold): (usize, &Vec<usize>)| -> Vec<(usize, f64)> {
+        let left = fit.without_set(&folds, k, parts.as_ref());
+        let Some(model) = left.covariance_of_first(problem.layout.theta_len()) else { return Vec::new() };
+        let asked = fold.iter().filter(|i| images.contains(i));
+        asked.filter_map(|&i| Some((i, 1e3 * of_image(fit, &model, i)?))).collect()
+    };
+    folds.iter().enumerate().flat_map(of_fold).collect()
 }
 
 /// The same of one image, m.
-fn of_image(fit: LinearProblem, left_open: &Covariance, index: usize) -> Option<f64> {
+fn of_image(fit: LinearProblem, model: &DMatrix<f64>, index: usize) -> Option<f64> {
     let (problem, state) = (&fit.adjustment.problem, &fit.adjustment.state);
     let (image, from) = (&problem.images[index], fit.adjustment.taken_from(index));
     let (terms, chain) = fit.lin.of(index)?;
-    let theta = chain.d_theta.ncols();
-    let model = left_open.reduced.view((0, 0), (theta, theta)).into_owned();
     let stop = &problem.stops[image.stop];
     let information = (0..from.joints())
         .map(|reading| problem.joint_error_information(stop, reading))
         .chain(problem.tie_information(image, from.tie));
     let latent = DVector::from_iterator(from.unknowns(), information.map(f64::recip));
     let through = |by: &DMatrix<f64>, covariance: &DMatrix<f64>| product(&product(by, covariance), &by.transpose());
-    let twist = through(&chain.d_theta, &model) + through(&chain.d_latent, &DMatrix::from_diagonal(&latent));
+    let twist = through(&chain.d_theta, model) + through(&chain.d_latent, &DMatrix::from_diagonal(&latent));
     let twist = Matrix6::from_column_slice(twist.as_slice()) + terms.pp.try_inverse()?;
     let variance = |x| {
         let mut by = Matrix3x6::identity();

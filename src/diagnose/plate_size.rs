@@ -14,7 +14,7 @@ use crate::fit::Fit;
 use crate::model::plate_modes::{ASPECT, DOT_GAIN, MODES};
 use crate::problem::{Adjustment, PlateShape, Problem, SCALE, State, UNKNOWN_SCALE, size_by_distance, telling_markers};
 use crate::series::Plate;
-use crate::solve::{ComponentOptions, Status, System, estimate_components};
+use crate::solve::{ComponentOptions, Elimination, Status, System, estimate_components};
 
 /// Stops that tell of the size: what more of them leave open is small beside what the links do.
 const MOST_STOPS: usize = 2000;
@@ -368,7 +368,7 @@ impl<'a> ReleasedSize<'a> {
         let at = self.column();
         let lin = self.adjustment.linearise()?;
         let linear = self.adjustment.linear(&lin);
-        let system = System::new(linear, 0.0);
+        let system = System::with(Elimination::of_steps(linear), linear, 0.0);
         let factor = system.factor(linear).ok()?;
         let mut along = DVector::zeros(system.rhs.len());
         along[at] = 1.0;

@@ -10,7 +10,7 @@ use super::equations::{Collector, E, Equations, MarkerTerms};
 use super::state::{Displaced, seen_centre};
 use super::{Image, Layout, MarkerObservation, Problem, State, TakenFrom, Tie};
 use crate::geom::{Pose, adjoint};
-use crate::linalg::wide;
+use crate::linalg::{add_combination, wide};
 use crate::model::circle::Prediction;
 use crate::model::plate_modes::MODES;
 use crate::model::robot::{Kinematics, LinearOrigins};
@@ -269,22 +269,32 @@ impl ImageTerms {
     }
 
     fn add_field(&mut self, equations: &Equations) {
-        for sight in equations.sights() {
-            let (by_pose, by_intrinsics) = (sight.by_pose(), sight.by_intrinsics());
-            for (at, (k, d)) in sight.by_field().iter().enumerate() {
-                let (column, dt) = (E + 2 * k, d.transpose());
-                let mut pe = self.pe.fixed_columns_mut::<2>(column);
-                pe += by_pose * d;
-                let mut be = self.be.fixed_rows_mut::<2>(column);
-                be += dt * sight.residual();
-                let mut with_e = self.ee.fixed_view_mut::<E, 2>(0, column);
-                with_e += by_intrinsics * d;
-                for (other, e) in &sight.by_field()[..=at] {
-                    let mut block = self.ee.fixed_view_mut::<2, 2>(E + 2 * other, column);
-                    block += e.transpose() * d;
+        let unknowns = self.be.len();
+        let (pe, ee) = (self.pe.as_mut_slice(), self.ee.as_mut_slice());
+        wide(
+            #[inline(always)]
+            || {
+                for sight in equations.sights() {
+                    let (pose, residual) = (sight.row_range(equations.pose_rows()), sight.residual());
+                    let intrinsics = sight.by_intrinsics();
+                    let intrinsics = [0, 1].map(|k| &intrinsics.as_slice()[E * k..E * (k + 1)]);
+                    for (at, (k, d)) in sight.by_field().iter().enumerate() {
+                        for (c, [by_u, by_v]) in (E + 2 * k..).zip([[d.m11, d.m21], [d.m12, d.m22]]) {
+                            add_combination(&mut pe[6 * c..6 * (c + 1)], pose, [by_u, by_v]);
+                            self.be[c] += by_u * residual[0] + by_v * residual[1];
+                            let (with_e, with_field) = ee[unknowns * c..unknowns * (c + 1)].split_at_mut(E);
+                            add_combination(with_e, intrinsics, [by_u, by_v]);
+                            let points = with_field.as_chunks_mut::<2>().0;
+                            for (other, e) in &sight.by_field()[..=at] {
+                                let [u, v] = &mut points[*other];
+                                *u += e.m11 * by_u + e.m21 * by_v;
+                                *v += e.m12 * by_u + e.m22 * by_v;
+                            }
+                        }
+                    }
                 }
-            }
-        }
+            },
+        );
         self.ee.fill_lower_triangle_with_upper_triangle();
     }
 }

@@ -1,8 +1,13 @@
 //! An adjustment near its optimum that is linearised where it stands, and what is left of it without some of its images.
 
+use std::borrow::Cow;
+
+use nalgebra::DMatrix;
+
 use super::elimination::parts::Parts;
 use super::elimination::system::System;
 use super::linear::{LinearProblem, Linearised};
+use super::optimum::covariance::fixed_are_known;
 use crate::problem::Adjustment;
 
 /// An adjustment, linearised where it stands.
@@ -26,6 +31,16 @@ impl LinearisedAdjustment {
     /// The linear problem.
     pub fn linear(&self) -> LinearProblem<'_> {
         self.adjustment.linear(&self.linearised)
+    }
+
+    /// Covariance of the first dense columns alone; `None` where the unknowns are not determined.
+    pub fn covariance_of_first(&self, columns: usize) -> Option<DMatrix<f64>> {
+        let linear = self.linear();
+        let system = self.system.as_ref().map_or_else(|| Cow::Owned(System::new(linear, 0.0)), Cow::Borrowed);
+        let of_first = DMatrix::identity(system.rhs.len(), columns);
+        let mut covariance = system.factor(linear).ok()?.solve_many(&of_first).rows(0, columns).into_owned();
+        fixed_are_known(&self.adjustment.problem, &mut covariance);
+        Some(covariance)
     }
 }
 

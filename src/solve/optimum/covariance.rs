@@ -51,8 +51,9 @@ impl LinearProblem<'_> {
 }
 
 /// Fixed columns have no variance.
-fn fixed_are_known(problem: &Problem, reduced: &mut DMatrix<f64>) {
-    for (i, _) in problem.layout.columns.iter().enumerate().filter(|(_, c)| !c.free) {
+pub(in crate::solve) fn fixed_are_known(problem: &Problem, reduced: &mut DMatrix<f64>) {
+    let columns = problem.layout.columns.iter().take(reduced.nrows());
+    for (i, _) in columns.enumerate().filter(|(_, c)| !c.free) {
         reduced[(i, i)] = 0.0;
     }
 }
