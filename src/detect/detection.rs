@@ -23,6 +23,8 @@ pub struct Detection {
     pub size_seen: Option<[u32; 2]>,
     /// Lines of a board of another size, in either order, where both of their ends are in view.
     pub other_lines: [Option<u32>; 2],
+    /// What is seen of a grid whose larger dots are not, with the ids of one of its turns, beside the failure that this is.
+    pub turn_open: Vec<Observation>,
     /// Why the image cannot be used, with no observations then; `None` where it can.
     pub failure: Option<Error>,
 }
@@ -50,6 +52,21 @@ impl Detection {
             all.clone().max().zip(all.min()).map_or(0, |(last, first)| last - first + 1)
         };
         [range(|k, columns| k % columns), range(|k, columns| k / columns)]
+    }
+
+    /// Takes over what is found with all dots of a grid taken as alike, unless larger ones are seen.
+    pub(super) fn leave_turn_open(&mut self, alike: Self) {
+        let shows_larger = alike.notices.iter().any(|notice| notice.code == Code::PlateContradicted);
+        if alike.failure.is_some() || shows_larger || alike.outline == Outline::LineMissing {
+            return;
+        }
+        let place = self.failure.take().map_or_else(|| "image".to_owned(), |failure| failure.place);
+        let what =
+            "none of the larger dots is seen: which way round the grid is, only the readings of a robot can tell";
+        let remedy =
+            "take the image so that all larger dots are seen, or state them in plate.toml: large = [[column, row], ..]";
+        self.failure = Some(Error::new(Code::PlateTurnOpen, place, what, remedy));
+        self.turn_open = alike.observations;
     }
 
     /// A board with a code that goes on where it should end.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::Detection;
 use crate::error::Code;
 use crate::linalg::median;
-use crate::series::Plate;
+use crate::series::{Marker, Plate, PlateKind};
 
 /// Gives the markers the median of the radii that the images show, where they show any.
 pub fn set_radii<'a>(plate: &mut Plate, images: impl Iterator<Item = &'a Detection>) {
@@ -32,4 +32,28 @@ pub(super) fn told_by_others(plate: &Plate, found: &[&Detection]) -> Option<(Pla
     set_radii(&mut measured, found.iter().copied());
     let is_open = |k: &usize| found[*k].failure.as_ref().is_some_and(|f| f.code == Code::PlateIncomplete);
     (measured.markers != plate.markers).then(|| (measured, (0..found.len()).filter(is_open).collect()))
+}
+
+/// The grid with all dots as most of them are in the images that can be used, where that hides how it is turned, and the images that may show it so.
+pub(super) fn with_dots_alike(
+    plate: &Plate,
+    found: &[(Option<(usize, usize)>, &Detection)],
+) -> Option<(Plate, Vec<usize>)> {
+    let usable = || found.iter().filter(|(_, detection)| detection.failure.is_none());
+    let size = usable().find_map(|(size, _)| *size).filter(|_| plate.kind == PlateKind::CircleGrid)?;
+    let mut alike = plate.clone();
+    set_radii(&mut alike, usable().map(|(_, detection)| *detection));
+    let [outer, inner] =
+        [|m: &Marker| m.outer_radius_m, |m: &Marker| m.inner_radius_m].map(|of| median(alike.markers.iter().map(of)));
+    let turns = alike.turns().len();
+    for marker in &mut alike.markers {
+        (marker.outer_radius_m, marker.inner_radius_m) = (outer?, inner?);
+    }
+    alike.large.clear();
+    let codes = [Code::PlateIncomplete, Code::MarkersUnmeasured];
+    let is_open = |(of, detection): &(Option<(usize, usize)>, &Detection)| {
+        *of == Some(size) && detection.failure.as_ref().is_some_and(|f| codes.contains(&f.code))
+    };
+    let open: Vec<usize> = (0..found.len()).filter(|k| is_open(&found[*k])).collect();
+    (alike.turns().len() > turns && !open.is_empty()).then_some((alike, open))
 }

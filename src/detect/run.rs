@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::dot_sizes::told_by_others;
+use super::dot_sizes::{told_by_others, with_dots_alike};
 use super::size_seen::{line_missing, nowhere_whole};
 use super::{Detection, Loaded, Outline, examine_loaded, other_kind, tags};
 use crate::error::{Code, Error, Notice, Result};
@@ -109,6 +109,12 @@ pub fn detect_series<P: Into<Loaded>>(
     note_unseen_tags(images, plate, &mut found);
     refuse_odd_sizes(images, &mut found);
     refuse_odd_dots(images, plate, &mut found);
+    let detections: Vec<_> = found.iter().map(|image| (image.size, &image.detection)).collect();
+    if let Some((alike, open)) = with_dots_alike(plate, &detections) {
+        let paths: Vec<&PathBuf> = open.iter().map(|&k| &images[k]).collect();
+        let again = in_batches(&paths, |path| one(path, &alike, ink));
+        open.into_iter().zip(again).for_each(|(k, image)| found[k].detection.leave_turn_open(image.detection));
+    }
     note_turned(images, &mut found);
     if !found.iter().any(shows) {
         name_other_kind(images, plate, picture, &mut found);

@@ -219,6 +219,7 @@ codes! {
     Input "Detection" {
         PlateNotFound "plate_not_found" "nothing in the image looks like the plate",
         PlateIncomplete "plate_incomplete" "too little of the plate is seen to tell which part it is",
+        PlateTurnOpen "plate_turn_open" "the dots that tell how a grid is turned are not seen",
         PlateMirrored "plate_mirrored" "the plate is seen in a mirror, or described mirrored",
         PlateContradicted "plate_contradicted" "the pattern that is seen is not that of the plate file",
         PlateLineHidden "plate_line_hidden" "a whole line of the plate is not seen where it should be",

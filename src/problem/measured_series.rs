@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::body::{BodySeen, InstrumentKind};
 use super::rejection::ImageRejection;
 use super::shared::Shared;
+use crate::error::Code;
 use crate::model::camera::{Camera, Lens};
 use crate::series::{CameraMount, Observation, Plate, PlateKind, ReadOtherwise};
 
@@ -191,6 +192,14 @@ pub struct MeasuredStop {
     pub observations: Shared<Vec<Observation>>,
     /// Why the image is left out already (unreadable, nothing found).
     pub left_out: Option<ImageRejection>,
+}
+
+impl MeasuredStop {
+    /// Whether it is left out because nothing in the image tells how the plate is turned: the ids are those of one of its turns.
+    pub fn is_turn_open(&self) -> bool {
+        let is_open = |why: &ImageRejection| matches!(why, ImageRejection::Unusable { why: Code::PlateTurnOpen, .. });
+        self.left_out.as_ref().is_some_and(is_open) && !self.observations.is_empty()
+    }
 }
 
 /// Index of a name among `names`, to which it is added where it is new.

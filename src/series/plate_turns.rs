@@ -38,6 +38,13 @@ impl Plate {
         (1..4).filter(allowed).filter_map(|quarters| self.turned(quarters)).collect()
     }
 
+    /// Those after which its markers lie in the same places, whatever their sizes.
+    pub fn turns_of_places(&self) -> Vec<PlateTurn> {
+        let mut alike = self.clone();
+        alike.markers.iter_mut().for_each(|m| (m.outer_radius_m, m.inner_radius_m) = (0.0, 0.0));
+        alike.turns()
+    }
+
     fn turned(&self, quarters: u8) -> Option<PlateTurn> {
         let alike = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(b.abs());
         let ids = self.markers.iter().map(|marker| {

@@ -6,11 +6,12 @@ use std::path::Path;
 
 use image::codecs::jpeg::JpegEncoder;
 use image::{GrayImage, Luma};
+use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use robotcal::Code;
-use robotcal::detect::{Detection, Picture, detect, detect_series};
-use robotcal::series::{Edge, Plate, parse_plate};
+use robotcal::detect::{Detection, Picture, SeriesImage, detect, detect_series};
+use robotcal::series::{Edge, Observation, Plate, parse_plate};
 use robotcal::simulate::conditions::Glare;
 
 use crate::circles_support::{Scene, View, pose, scene};
@@ -337,7 +338,8 @@ fn an_image_without_the_larger_dot_that_the_others_show_is_refused() {
     }
     let seen = detect_series(&paths, &stated, |path| Ok(pictures[path].clone()), |_| {});
     let failures: Vec<Option<Code>> = seen.iter().map(|i| i.detection.failure.as_ref().map(|f| f.code)).collect();
-    assert_eq!(failures, [None, None, Some(Code::PlateIncomplete), None]);
+    assert_eq!(failures, [None, None, Some(Code::PlateTurnOpen), None]);
+    assert_eq!(seen.iter().map(|i| i.detection.turn_open.len()).collect::<Vec<_>>(), [0, 0, 48, 0]);
     let sizes = &seen[0].detection.circles.as_ref().unwrap().sizes;
     assert_eq!(sizes.large.len(), 1);
     for (id, [outer, _]) in &sizes.radii_m {
@@ -361,7 +363,40 @@ fn images_that_cannot_show_the_larger_dot_do_not_outvote_those_that_do() {
     let seen = detect_series(&paths, &stated, |path| Ok(picture(number(path))), |_| {});
     let counts: Vec<usize> = seen.iter().map(|i| i.detection.observations.len()).collect();
     assert_eq!(counts, [48, 48, 0, 0, 0]);
-    assert!(seen[2..].iter().all(|i| i.detection.failure.as_ref().is_some_and(|f| f.code == Code::PlateIncomplete)));
+    let (seen, open) = seen.split_at(2);
+    assert!(seen.iter().all(|i| i.detection.turn_open.is_empty()));
+    for SeriesImage { detection, .. } in open {
+        assert_eq!(detection.failure.as_ref().map(|f| f.code), Some(Code::PlateTurnOpen));
+        assert_eq!(detection.turn_open.len(), 47);
+    }
+}
+
+/// The same where the plate file states the larger dot: something hides it and its neighbours, and what is seen of the others is right up to a turn.
+#[test]
+fn an_image_that_hides_a_stated_larger_dot_is_right_up_to_a_turn() {
+    let stated = grid("columns = 8\nrows = 6\nlarge = [[0, 0]]");
+    let paths: Vec<_> = (0..3).map(|seed| Path::new(&format!("{seed}.png")).to_path_buf()).collect();
+    let scene = |seed: u64| {
+        let mut plate = printed(&stated, &[0], &[]);
+        if seed == 2 {
+            plate.markers[0].outer_radius_m = 0.24 * PITCH_M;
+        }
+        let view = view(&mut ChaCha8Rng::seed_from_u64(seed), Spoiling::None);
+        Scene { plate, camera_from_plate: pose(&view), ..scene(&view) }
+    };
+    let number = |path: &Path| path.file_stem().unwrap().to_str().unwrap().parse().unwrap();
+    let seen = detect_series(&paths, &stated, |path| Ok(scene(number(path)).render(number(path))), |_| {});
+    assert_eq!(seen.iter().map(|i| i.detection.observations.len()).collect::<Vec<_>>(), [48, 48, 0]);
+    let turn = stated.turns_of_places().remove(0);
+    let shown = scene(2);
+    let is_off = |id: &dyn Fn(u32) -> u32| {
+        let off = |o: &Observation| {
+            (shown.centroid(id(o.marker) as usize, Edge::Outer).unwrap() - Vector2::from(o.uv)).norm()
+        };
+        seen[2].detection.turn_open.iter().map(off).fold(0.0, f64::max)
+    };
+    assert_eq!(seen[2].detection.turn_open.len(), 48);
+    assert!(is_off(&|id| id).min(is_off(&|id| turn.id(id))) < 0.5);
 }
 
 /// A speck on one image of a grid of equal dots is no larger dot, whether the others show all dots or not.

@@ -28,6 +28,7 @@ mod mirror_image;
 mod mixtures;
 mod moved_in_time;
 mod normal_equations;
+mod open_turns;
 mod patterns;
 mod plate_size;
 mod random_worlds;

@@ -171,6 +171,8 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/bodies/touch_mistakes.rs NAMED", "how many are named"),
     ("identify/start/turns.rs MOST_MISFIT", "robust loss of a choice"),
     ("identify/start/turns.rs ROUNDS", "most iterations"),
+    ("identify/start/turns.rs TOLD", "turns are a quarter apart"),
+    ("identify/start/turns.rs FEWEST_KNOWN", "a choice by fewer is none"),
     ("identify/two_stage/fit.rs DECREMENT", "convergence"),
     ("identify/two_stage/fit.rs FIRST_FACTOR", "first guess"),
     ("identify/two_stage/fit.rs FIRST_ISOTROPIC", "first guess"),

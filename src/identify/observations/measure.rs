@@ -221,7 +221,8 @@ fn look_through(
     let usable = images.iter().filter(|i| i.detection.failure.is_none());
     let size = usable.filter_map(|i| i.size).next().map(|(w, h)| (w as u32, h as u32));
     let seen = |image: SeenImage| {
-        let Detection { observations, failure, .. } = image.detection;
+        let Detection { observations, turn_open, failure, .. } = image.detection;
+        let observations = if turn_open.is_empty() { observations } else { turn_open };
         let remedy = failure.as_ref().map(|error| error.remedy.clone());
         let left_out = failure.map(|error| ImageRejection::Unusable { why: error.code, what: error.what });
         Seen { observations: observations.into(), left_out, remedy }

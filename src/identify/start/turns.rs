@@ -3,6 +3,8 @@
 //! Two images of one camera mounting and one placement see the plate at M_i = X^-1 A_i Z (X, Z unknown, A from the readings), so that
 //! M_i M_j^-1 turns by the same angle as A_i A_j^-1, whatever X and Z are. An image whose ids are off by a turn T of the plate shows M_i T,
 //! and the angle does not fit. What is left open is one turn of all images together: a choice of the plate's frame.
+//!
+//! An image of a grid whose larger dots are not seen is compared so with those that show them, and stays left out unless one turn alone fits.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -14,11 +16,15 @@ use crate::geom::{exp_so3, log_so3};
 use crate::identify::photogrammetry::free_poses::free_poses_of;
 use crate::init::{PosePair, solve_hand_eye};
 use crate::model::robot::Robot;
-use crate::problem::MeasuredSeries;
+use crate::problem::{MeasuredSeries, MeasuredStop};
 use crate::series::PlateTurn;
 
 /// Angles further apart do not count more, rad: such an image has another fault.
 const MOST_MISFIT: f64 = 0.3;
+/// A turn is told where its misfit is below this on the average, and that of every other turn above it by as much, rad: they are a quarter turn apart.
+const TOLD: f64 = 0.1;
+/// Fewest images with a known turn that tell that of another.
+const FEWEST_KNOWN: usize = 3;
 /// Most rounds in which every image is compared with all others.
 const ROUNDS: usize = 10;
 
@@ -30,6 +36,8 @@ struct View {
     camera_from_plate: Vec<(u8, Matrix3<f64>)>,
     /// M as the ids are, and A.
     pair: PosePair,
+    /// Whether the image does not tell the turn of a plate that others tell.
+    is_open: bool,
 }
 
 /// The series with ids as the readings demand them; unchanged where the plates have no symmetry or no camera poses are found.
@@ -39,29 +47,53 @@ pub(in crate::identify) fn settled<'a>(
     limits: &Limits,
 ) -> Cow<'a, [MeasuredSeries]> {
     let turns: Vec<Vec<PlateTurn>> = series.iter().map(|s| s.plate.turns()).collect();
-    if turns.iter().all(Vec::is_empty) {
+    let has_open = series.iter().any(|s| s.stops.iter().any(MeasuredStop::is_turn_open));
+    if turns.iter().all(Vec::is_empty) && !has_open {
         return Cow::Borrowed(series);
     }
     let mut turned = series.to_vec();
     let mut changed = false;
     let mut found: BTreeMap<usize, Matrix3<f64>> = BTreeMap::new();
     for (placement, views) in groups(robot, series, &turns, limits) {
+        let (open, views): (Vec<View>, Vec<View>) = views.into_iter().partition(|view| view.is_open);
+        if views.is_empty() {
+            continue;
+        }
         let own = agreeing(&views);
         let common = common_turn(&views, &own, &turns[views[0].series], found.get(&placement));
         if let Some(plate) = plate_of(&views, &own, common) {
             found.entry(placement).or_insert(plate);
         }
-        for (view, own) in views.iter().zip(own) {
-            let quarters = (own + common) % 4;
+        let quarters: Vec<u8> = own.iter().map(|own| (own + common) % 4).collect();
+        for view in &open {
+            let Some(quarters) = told(view, &views, &quarters) else { continue };
+            let stop = &mut turned[view.series].stops[view.stop];
+            stop.left_out = None;
+            changed = true;
+            if let Some(turn) = series[view.series].plate.turns_of_places().iter().find(|t| t.quarters == quarters) {
+                turn_ids(stop, turn);
+            }
+        }
+        for (view, quarters) in views.iter().zip(quarters) {
             let turn = turns[view.series].iter().find(|t| t.quarters == quarters);
             let Some(turn) = turn else { continue };
-            let observations = &mut turned[view.series].stops[view.stop].observations;
-            observations.iter_mut().for_each(|o| o.marker = turn.id(o.marker));
-            observations.sort_by_key(|o| (o.marker, o.edge));
+            turn_ids(&mut turned[view.series].stops[view.stop], turn);
             changed = true;
         }
     }
     if changed { Cow::Owned(turned) } else { Cow::Borrowed(series) }
+}
+
+fn turn_ids(stop: &mut MeasuredStop, turn: &PlateTurn) {
+    stop.observations.iter_mut().for_each(|o| o.marker = turn.id(o.marker));
+    stop.observations.sort_by_key(|o| (o.marker, o.edge));
+}
+
+/// The series with the images that tell no turn as others, so that they have a pose.
+fn with_open(series: &[MeasuredSeries]) -> Vec<MeasuredSeries> {
+    let mut all = series.to_vec();
+    all.iter_mut().flat_map(|s| &mut s.stops).filter(|stop| stop.is_turn_open()).for_each(|stop| stop.left_out = None);
+    all
 }
 
 /// Images that share a camera mounting and a placement, with the index of this and the poses that the images alone give; the largest first.
@@ -71,7 +103,9 @@ fn groups(
     turns: &[Vec<PlateTurn>],
     limits: &Limits,
 ) -> Vec<(usize, Vec<View>)> {
-    let Ok((adjustment, free, _)) = free_poses_of(robot, series, limits, |_| Ok(())) else { return Vec::new() };
+    let Ok((adjustment, free, _)) = free_poses_of(robot, &with_open(series), limits, |_| Ok(())) else {
+        return Vec::new();
+    };
     let mut groups: BTreeMap<(usize, usize), Vec<View>> = BTreeMap::new();
     let place = |i: usize| {
         let images = &adjustment.problem.images;
@@ -81,13 +115,17 @@ fn groups(
         let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
         let pair = PosePair::of_stop(robot, image.mount, &stop.readings, pose.camera_from_plate);
         let seen = pair.camera_from_plate.rotation;
-        let tried = std::iter::once(0).chain(turns[image.series].iter().map(|t| t.quarters));
+        let (own, stop_index) = (&series[image.series], place(i));
+        let is_open = own.stops[stop_index].is_turn_open();
+        let allowed = if is_open { own.plate.turns_of_places() } else { turns[image.series].clone() };
+        let tried = std::iter::once(0).chain(allowed.iter().map(|t| t.quarters));
         let camera_from_plate = tried.map(|quarters| (quarters, seen * about(quarters)));
         groups.entry((image.mounting, image.placement)).or_default().push(View {
             series: image.series,
-            stop: place(i),
+            stop: stop_index,
             camera_from_plate: camera_from_plate.collect(),
             pair,
+            is_open,
         });
     }
     let of_placement = |((_, placement), views)| (placement, views);
@@ -121,25 +159,40 @@ fn about(quarters: u8) -> Matrix3<f64> {
     exp_so3(&Vector3::new(0.0, 0.0, -f64::from(quarters) * std::f64::consts::FRAC_PI_2))
 }
 
+/// How far the angle between two images, each turned by one of its quarters, is from that between the readings, rad.
+fn misfit((a, turn_a): (&View, usize), (b, turn_b): (&View, usize)) -> f64 {
+    let angle = |a: &Matrix3<f64>, b: &Matrix3<f64>| log_so3(&(a * b.transpose())).norm();
+    let seen = angle(&a.camera_from_plate[turn_a].1, &b.camera_from_plate[turn_b].1);
+    (seen - angle(&a.pair.chain.rotation, &b.pair.chain.rotation)).abs().min(MOST_MISFIT)
+}
+
+/// The turn of an image with which alone it agrees with those whose turns, by quarters, are known.
+fn told(view: &View, known: &[View], quarters: &[u8]) -> Option<u8> {
+    let place = |(other, quarters): (&View, &u8)| other.camera_from_plate.iter().position(|(q, _)| q == quarters);
+    let places: Option<Vec<usize>> = known.iter().zip(quarters).map(place).collect();
+    let places = places.filter(|places| places.len() >= FEWEST_KNOWN)?;
+    let mean = |k: usize| {
+        let all = known.iter().zip(&places).map(|(other, turn)| misfit((view, k), (other, *turn)));
+        all.sum::<f64>() / known.len() as f64
+    };
+    let mut misfits: Vec<(f64, u8)> =
+        view.camera_from_plate.iter().enumerate().map(|(k, (quarters, _))| (mean(k), *quarters)).collect();
+    misfits.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let [(best, quarters), (next, _), ..] = misfits[..] else { return None };
+    (best < TOLD && next > best + TOLD).then_some(quarters)
+}
+
 /// The turns, by quarters, with which the images agree best; that of most images is none.
 fn agreeing(views: &[View]) -> Vec<u8> {
-    let angle = |a: &Matrix3<f64>, b: &Matrix3<f64>| log_so3(&(a * b.transpose())).norm();
     let mut chosen: Vec<Option<usize>> = vec![None; views.len()];
     for round in 0..ROUNDS {
         let before = chosen.clone();
         for i in 0..views.len() {
-            let misfit = |k: usize| -> f64 {
+            let sum = |k: usize| -> f64 {
                 let pairs = chosen.iter().enumerate().filter(|(j, _)| *j != i).filter_map(|(j, &c)| Some((j, c?)));
-                pairs
-                    .map(|(j, c)| {
-                        let seen = angle(&views[i].camera_from_plate[k].1, &views[j].camera_from_plate[c].1);
-                        (seen - angle(&views[i].pair.chain.rotation, &views[j].pair.chain.rotation))
-                            .abs()
-                            .min(MOST_MISFIT)
-                    })
-                    .sum()
+                pairs.map(|(j, c)| misfit((&views[i], k), (&views[j], c))).sum()
             };
-            let misfits: Vec<f64> = (0..views[i].camera_from_plate.len()).map(misfit).collect();
+            let misfits: Vec<f64> = (0..views[i].camera_from_plate.len()).map(sum).collect();
             chosen[i] = (0..misfits.len()).min_by(|&a, &b| misfits[a].total_cmp(&misfits[b]));
         }
         if round > 0 && chosen == before {
@@ -169,7 +222,8 @@ mod tests {
             let tried = std::iter::once(&0).chain(allowed);
             let camera_from_plate = tried.map(|&q| (q, seen * about(q))).collect();
             let [chain, seen] = [rotation(k), seen].map(|r| Pose::new(r, Vector3::zeros()));
-            View { series: 0, stop: k, camera_from_plate, pair: PosePair { camera_from_plate: seen, chain } }
+            let pair = PosePair { camera_from_plate: seen, chain };
+            View { series: 0, stop: k, camera_from_plate, pair, is_open: false }
         };
         off.iter().enumerate().map(view).collect()
     }
@@ -180,5 +234,25 @@ mod tests {
         assert_eq!(agreeing(&views(&half, &[2])), half);
         let quarter = [0, 1, 0, 3, 0, 2, 0, 0];
         assert_eq!(agreeing(&views(&quarter, &[1, 2, 3])), quarter);
+    }
+
+    /// The images that tell their turn tell that of another; not too few of them, not readings that do not belong to the image, and not
+    /// images that turn with the camera about the plate by a quarter, where two turns fit alike.
+    #[test]
+    fn an_open_turn_is_told_or_left_open() {
+        for quarters in 0..4 {
+            let mut all = views(&[quarters, 0, 0, 0, 0, 0, 0, 0], &[1, 2, 3]);
+            assert_eq!(told(&all[0], &all[1..], &[0; 7]), Some(quarters));
+            assert_eq!(told(&all[0], &all[1..3], &[0; 2]), None);
+            all[0].pair.chain.rotation *= exp_so3(&Vector3::new(0.4, -0.5, 0.3));
+            assert_eq!(told(&all[0], &all[1..], &[0; 7]), None);
+        }
+        let mut all = views(&[0; 5], &[1, 2, 3]);
+        let (seen, chain) = (all[0].camera_from_plate[0].1, all[0].pair.chain.rotation);
+        for view in &mut all[1..] {
+            view.camera_from_plate = vec![(0, seen * about(1))];
+            view.pair.chain.rotation = chain * about(1);
+        }
+        assert_eq!(told(&all[0], &all[1..], &[0; 4]), None);
     }
 }
