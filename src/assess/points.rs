@@ -192,6 +192,11 @@ fn pairs(points: usize, readings: usize) -> impl Iterator<Item = (usize, usize, 
 }
 
 impl PointFit {
+    /// Sum of the squares of the residuals, m^2.
+    pub(super) fn squares(&self) -> f64 {
+        self.residuals_m.iter().map(Vector3::norm_squared).sum()
+    }
+
     /// How far a point, of the fit or not, was measured from where the robot puts it, m, in the frame of the device.
     pub fn residual_m(&self, robot: &Robot, point: &MeasuredPoint) -> Vector3<f64> {
         let on_tip = robot.base_from_tip(&point.readings).transform(&self.tip_point_m);

@@ -37,14 +37,15 @@ pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], lim
     let beside = |odd: &[usize]| Beside::these(robot, points, odd, (stated_m, limits));
     let mut odd: Vec<usize> = Vec::new();
     let mut fit = beside(&odd)?;
-    // Of few points one draws the fit along, and makes much usual: it may be seen only once it is left out, and counts then where it is wrong for sure.
-    let is_drawn = fit.beyond.is_empty();
-    if is_drawn {
+    // Of few points one draws the fit along, and makes much usual: it may be seen only once it is left out.
+    if fit.beyond.is_empty() {
         odd.push(fit.farthest()?);
-        fit = beside(&odd)?;
-        if !fit.beyond.contains(&odd[0]) {
+        let left_out = beside(&odd)?;
+        let squares = [&fit, &left_out].map(|beside| beside.without.squares());
+        if !left_out.beyond.contains(&odd[0]) || !is_no_chance(squares, points.len(), limits) {
             return None;
         }
+        fit = left_out;
     }
     // They only grow in number, and only fall then, so that it ends.
     loop {
@@ -66,10 +67,13 @@ pub fn odd_points(robot: &Robot, points: &[MeasuredPoint], stated_m: &[f64], lim
     }
     let off_m = odd.iter().map(|k| fit.off_m[*k]).collect();
     let wrong = wrong_points(robot, points, (&odd, &fit.without), limits).unwrap_or_default();
-    if is_drawn && wrong != odd {
-        return None;
-    }
     Some(OddPoints { points: odd, off_m, without: fit.without, wrong })
+}
+
+/// True where squares that a point leaves in and left out are no chance, of so many points of which each could be the one.
+fn is_no_chance([with, without]: [f64; 2], points: usize, limits: &Limits) -> bool {
+    let most = limits.displaced_false_alarms.ln() - (points as f64).ln();
+    log_chance((with - without) / with, freedom(points), POINT) <= most
 }
 
 /// A point that is off by so much less than the farthest may only be drawn along by it.

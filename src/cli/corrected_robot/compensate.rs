@@ -10,7 +10,6 @@ use clap::{Args, ValueEnum};
 use super::compensate_frames::{Choice, Side, Sides, known_error};
 use super::compensate_models::{corrected_already, equal, exchanged, not_given};
 use super::controller_base::controller_base;
-use crate::assess::Limits;
 use crate::cli::Verdict;
 use crate::cli::flags::joint_table::Unit;
 use crate::cli::flags::robot::noted_chain;
@@ -346,7 +345,7 @@ fn in_other_base(
         return Ok(None);
     }
     let poses = (Weight::Gate, "poses are read");
-    Ok(controller_base(&urdf::read(nominal)?, [&chain.base, &chain.tip], &Limits::default(), poses))
+    Ok(controller_base(&urdf::read(nominal)?, [&chain.base, &chain.tip], poses))
 }
 
 /// The link of the chain on which `--base` is fixed, where it does not lie in the chain itself.

@@ -1,6 +1,6 @@
 //! Controllers of Universal Robots compute in the frame `base`, which their descriptions have beside `base_link`, turned by half a turn.
 
-use crate::assess::Limits;
+use super::compensate_frames::SAME_ORIGIN;
 use crate::diagnose::Weight;
 use crate::error::Code;
 use crate::geom::Pose;
@@ -13,13 +13,12 @@ const NAME: &str = "base";
 pub(super) fn controller_base(
     description: &RobotDescription,
     [base, tip]: [&str; 2],
-    limits: &Limits,
     (weight, poses): (Weight, &str),
 ) -> Option<FileFinding> {
     let (_, base_from_controller) = description.fixed_base(NAME, tip).filter(|(link, _)| *link == base)?;
     let (rad, m) = base_from_controller.distance(&Pose::identity());
     let (deg, mm) = (rad.to_degrees(), 1e3 * m);
-    let is_other = m > limits.same_base_m || rad > limits.same_work_rad;
+    let is_other = m > SAME_ORIGIN || rad > SAME_ORIGIN;
     let text = format!(
         "{poses} in {base}, and controllers of Universal Robots compute in {NAME}, which is turned by {deg:.0} deg from it and lies {mm:.0} mm away: give --base {NAME}"
     );

@@ -115,7 +115,7 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     let poses = (Weight::Note, "robotcal_frames.script has the plane");
     let of_base = [record.robot.base.as_str(), record.robot.tip.as_str()];
     let in_own = args.base.is_none() && frames.work.is_some();
-    findings.extend(in_own.then(|| controller_base(&description, of_base, &found.limits, poses)).flatten());
+    findings.extend(in_own.then(|| controller_base(&description, of_base, poses)).flatten());
     let is_carried = carried(robot.exported(), frames.work.as_ref().map(|w| w.name.as_str()), &subject);
     let work = frames.work.clone().filter(|_| is_carried.is_none());
     let of_controller = Frames { work, ..frames.clone() };

@@ -16,7 +16,7 @@ use crate::geom::{exp_so3, log_so3};
 use crate::identify::photogrammetry::free_poses::free_poses_of;
 use crate::init::{PosePair, solve_hand_eye};
 use crate::model::robot::Robot;
-use crate::problem::{MeasuredSeries, MeasuredStop};
+use crate::problem::{Image, MeasuredSeries, MeasuredStop};
 use crate::series::PlateTurn;
 
 /// Angles further apart do not count more, rad: such an image has another fault.
@@ -89,10 +89,64 @@ fn turn_ids(stop: &mut MeasuredStop, turn: &PlateTurn) {
     stop.observations.sort_by_key(|o| (o.marker, o.edge));
 }
 
-/// The series with the images that tell no turn as others, so that they have a pose.
-fn with_open(series: &[MeasuredSeries]) -> Vec<MeasuredSeries> {
+/// The series with the images that tell no turn as others, turned by so many quarters, so that they have a pose.
+fn with_open(series: &[MeasuredSeries], quarters: u8) -> Vec<MeasuredSeries> {
     let mut all = series.to_vec();
-    all.iter_mut().flat_map(|s| &mut s.stops).filter(|stop| stop.is_turn_open()).for_each(|stop| stop.left_out = None);
+    for own in &mut all {
+        let turns = own.plate.turns_of_places();
+        let turn = turns.iter().find(|turn| turn.quarters == quarters);
+        for stop in own.stops.iter_mut().filter(|stop| stop.is_turn_open()) {
+            stop.left_out = None;
+            turn.into_iter().for_each(|turn| turn_ids(stop, turn));
+        }
+    }
+    all
+}
+
+/// Where an image on the robot stands, with what it sees and the readings.
+struct Posed {
+    series: usize,
+    stop: usize,
+    group: (usize, usize),
+    pair: PosePair,
+}
+
+/// Those to which the images alone give a pose.
+fn posed(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) -> Vec<Posed> {
+    let Ok((adjustment, free, _)) = free_poses_of(robot, series, limits, |_| Ok(())) else { return Vec::new() };
+    let images = &adjustment.problem.images;
+    let place = |i: usize| images[..i].iter().filter(|other| other.series == images[i].series).count();
+    let of = |(i, image): (usize, &Image)| {
+        let (readings, pose) = (&adjustment.problem.posture(i)?.readings, free.poses[i].as_ref()?);
+        let pair = PosePair::of_stop(robot, image.mount, readings, pose.camera_from_plate);
+        Some(Posed { series: image.series, stop: place(i), group: (image.mounting, image.placement), pair })
+    };
+    adjustment.used().filter_map(|(i, image, _)| of((i, image))).collect()
+}
+
+/// The same, with the images that tell no turn as they are. One whose ids are off by a turn may not fit the plate as the others found it, and has a pose only
+/// where it is turned back.
+fn posed_as_they_are(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) -> Vec<Posed> {
+    let mut all = posed(robot, &with_open(series, 0), limits);
+    for quarters in 1..4 {
+        let has_pose = |s: usize, k: usize| all.iter().any(|posed| (posed.series, posed.stop) == (s, k));
+        let lacks = |(s, own): (usize, &MeasuredSeries)| {
+            let has_turn = own.plate.turns_of_places().iter().any(|turn| turn.quarters == quarters);
+            let open = own.stops.iter().enumerate().filter(|(_, stop)| stop.is_turn_open() && stop.readings.is_some());
+            has_turn && open.into_iter().any(|(k, _)| !has_pose(s, k))
+        };
+        if !series.iter().enumerate().any(lacks) {
+            continue;
+        }
+        let turned = posed(robot, &with_open(series, quarters), limits).into_iter();
+        let new = turned.filter(|p| series[p.series].stops[p.stop].is_turn_open() && !has_pose(p.series, p.stop));
+        let turned_back = |mut posed: Posed| {
+            posed.pair.camera_from_plate.rotation *= about(4 - quarters);
+            posed
+        };
+        let new: Vec<Posed> = new.map(turned_back).collect();
+        all.extend(new);
+    }
     all
 }
 
@@ -103,30 +157,14 @@ fn groups(
     turns: &[Vec<PlateTurn>],
     limits: &Limits,
 ) -> Vec<(usize, Vec<View>)> {
-    let Ok((adjustment, free, _)) = free_poses_of(robot, &with_open(series), limits, |_| Ok(())) else {
-        return Vec::new();
-    };
     let mut groups: BTreeMap<(usize, usize), Vec<View>> = BTreeMap::new();
-    let place = |i: usize| {
-        let images = &adjustment.problem.images;
-        images[..i].iter().filter(|other| other.series == images[i].series).count()
-    };
-    for (i, image, _) in adjustment.used() {
-        let (Some(stop), Some(pose)) = (adjustment.problem.posture(i), &free.poses[i]) else { continue };
-        let pair = PosePair::of_stop(robot, image.mount, &stop.readings, pose.camera_from_plate);
-        let seen = pair.camera_from_plate.rotation;
-        let (own, stop_index) = (&series[image.series], place(i));
-        let is_open = own.stops[stop_index].is_turn_open();
-        let allowed = if is_open { own.plate.turns_of_places() } else { turns[image.series].clone() };
+    for Posed { series: s, stop, group, pair } in posed_as_they_are(robot, series, limits) {
+        let (seen, own) = (pair.camera_from_plate.rotation, &series[s]);
+        let is_open = own.stops[stop].is_turn_open();
+        let allowed = if is_open { own.plate.turns_of_places() } else { turns[s].clone() };
         let tried = std::iter::once(0).chain(allowed.iter().map(|t| t.quarters));
-        let camera_from_plate = tried.map(|quarters| (quarters, seen * about(quarters)));
-        groups.entry((image.mounting, image.placement)).or_default().push(View {
-            series: image.series,
-            stop: stop_index,
-            camera_from_plate: camera_from_plate.collect(),
-            pair,
-            is_open,
-        });
+        let camera_from_plate = tried.map(|quarters| (quarters, seen * about(quarters))).collect();
+        groups.entry(group).or_default().push(View { series: s, stop, camera_from_plate, pair, is_open });
     }
     let of_placement = |((_, placement), views)| (placement, views);
     let mut all: Vec<(usize, Vec<View>)> = groups.into_iter().map(of_placement).collect();
