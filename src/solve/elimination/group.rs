@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::runs::{Run, runs};
+use super::runs::{Run, runs, upper_part};
 use crate::linalg::add_gram;
 
 /// The unknowns that some stops touch between them.
@@ -77,16 +77,8 @@ impl Group {
     /// The upper triangle of the part of a symmetric matrix over all unknowns that belongs to those of the group, half of its diagonal:
     /// it and its transpose add up to that part.
     pub fn half_of(&self, all: &DMatrix<f64>) -> DMatrix<f64> {
-        let n = self.rows.len();
-        let mut half = DMatrix::zeros(n, n);
-        for (j, (mut own, &column)) in half.column_iter_mut().zip(&self.rows).enumerate() {
-            let of = all.column(column);
-            for Run { from, into, length } in self.runs.iter().take_while(|run| run.from <= j) {
-                let length = (*length).min(j + 1 - from);
-                own.rows_mut(*from, length).copy_from(&of.rows(*into, length));
-            }
-            own[j] *= 0.5;
-        }
+        let mut half = upper_part(&self.runs, all);
+        (0..half.nrows()).for_each(|j| half[(j, j)] *= 0.5);
         half
     }
 

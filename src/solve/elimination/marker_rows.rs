@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Matrix3};
 use rayon::prelude::*;
 
 use super::alike::MOST;
-use super::runs::{Run, runs};
+use super::runs::{Run, runs, upper_part};
 use super::seen_markers::SeenMarkers;
 use crate::linalg::{
     COLUMNS_A_BLOCK, add_combination, mirror_upper, part_of_gram, product_with_rows, transposed_product, wide,
@@ -233,17 +233,7 @@ impl MarkerBlock {
 
     /// The upper triangle of the part of a matrix over all unknowns that belongs to its rows.
     pub fn upper_part_of(&self, all: &DMatrix<f64>) -> DMatrix<f64> {
-        let n = self.values.nrows();
-        let mut own = DMatrix::zeros(n, n);
-        let columns = self.runs.iter().flat_map(|run| run.into..run.into + run.length);
-        for (j, (mut part, column)) in own.column_iter_mut().zip(columns).enumerate() {
-            let of = all.column(column);
-            for Run { from, into, length } in self.runs.iter().take_while(|run| run.from <= j) {
-                let length = (*length).min(j + 1 - from);
-                part.rows_mut(*from, length).copy_from(&of.rows(*into, length));
-            }
-        }
-        own
+        upper_part(&self.runs, all)
     }
 
     /// Place of the first row that it has from `row` on.
