@@ -158,7 +158,7 @@ fn confirms(real: &Path, names: &[&str], selections: &[&[usize]], tracker: &str)
         cells.insert(1, format!("{expected:.3} | {:.2}", expected / (1e3 * found[0])));
         println!("| {} | {} |", names.join(" + "), cells.join(" | "));
         // What the other URDF lacks is known, and another where the stops are than at the points, four fifths of which lie outside.
-        let is_right = (found.iter().zip(within)).all(|(found, [least, most])| (least..most).contains(&found))
+        let is_right = (found.iter().zip(within)).all(|(found, [least, most])| (least..most).contains(found))
             && (0.7..1.4).contains(&ratio[2])
             && found[0] < 0.46e-3
             && found[0] < nominal
