@@ -333,14 +333,16 @@ fn program_findings(
         .collect()
 }
 
-/// Poses of URScript where no base is named, and the controller computes in another one than that of the chain.
+/// Poses of URScript where no base is named, and the controller computes in another one than that of the chain. Joints that were taught with a pose tell its
+/// base themselves.
 fn in_other_base(
     args: &CompensateArgs,
     nominal: &Path,
     (language, program): (Language, &Program),
     chain: &Chain,
 ) -> Result<Option<FileFinding>> {
-    let has_poses = program.targets.iter().any(|target| matches!(target.kind, TargetKind::Pose(_)));
+    let is_pose = |target: &Target| matches!(&target.kind, TargetKind::Pose(pose) if pose.taught.is_none());
+    let has_poses = program.targets.iter().any(is_pose);
     if args.base.is_some() || language != Language::UrScript || !has_poses {
         return Ok(None);
     }

@@ -93,7 +93,7 @@ pub(super) trait JointError {
     /// What these symbols mean, for the head of compensation.toml, line by line.
     const SYMBOLS: &'static [&'static str] = &[];
 
-    /// The smallest robot model that has terms of this kind; larger ones have them, too.
+    /// The smallest robot model that has terms of this kind; those that contain it have them, too.
     const MODEL: RobotModel;
 
     /// The same for joints that carry the arm ([`Chain::carries_arm`]).

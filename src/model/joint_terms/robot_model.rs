@@ -1,7 +1,7 @@
 //! Which joint errors a model of the robot has.
 
 /// Which joint terms are fitted beside twists.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RobotModel {
     /// Joint offsets.
@@ -22,14 +22,25 @@ impl RobotModel {
     /// Those among which the data choose.
     pub const CHOICES: [Self; 5] = [Self::Rigid, Self::Gear, Self::Sag, Self::GearSag, Self::Full];
 
+    /// Which errors it has beside offsets, or may have: gears, sag of the arm, and what only the largest has.
+    const fn errors(self) -> [bool; 3] {
+        match self {
+            Self::Rigid => [false, false, false],
+            Self::Gear => [true, false, false],
+            Self::Sag => [false, true, false],
+            Self::GearSag => [true, true, false],
+            Self::Full | Self::Auto => [true, true, true],
+        }
+    }
+
     /// True where it has all terms of another.
     pub(in crate::model) fn contains(self, other: Self) -> bool {
-        other <= self && (self, other) != (Self::Sag, Self::Gear)
+        self.errors().into_iter().zip(other.errors()).all(|(own, other)| own || !other)
     }
 
     /// True where it has gears, or may have them.
     pub const fn has_gears(self) -> bool {
-        !matches!(self, Self::Rigid | Self::Sag)
+        self.errors()[0]
     }
 
     /// Its name in options and files.

@@ -65,7 +65,7 @@ macro_rules! joint_terms {
                 match self { $($(Self::$term { .. } => $term::PRIOR_SIGMA,)+)+ }
             }
 
-            /// The smallest robot model that has such terms of every joint; larger ones have them, too.
+            /// The smallest robot model that has such terms of every joint; those that contain it have them, too.
             pub(in crate::model) fn model(self) -> RobotModel {
                 match self { $($(Self::$term { .. } => $term::MODEL,)+)+ }
             }
