@@ -160,7 +160,7 @@ impl<'a> FlangeModel<'a> {
     /// Pose relative to what stands still, and `J`, 6 x columns that act through the camera poses.
     fn derivative(&self, stop: &Posture) -> (Pose, DMatrix<f64>) {
         let kinematics = self.robot.kinematics(stop, &vec![0.0; stop.readings.len()]);
-        let pose = self.still.inverse() * self.exported.pose_at(stop, &vec![0.0; stop.readings.len()]);
+        let pose = self.still.inverse() * self.exported.base_from_tip_at(stop);
         let mut j = DMatrix::zeros(6, self.layout.theta_len());
         for (k, d) in kinematics.d_twists.iter().enumerate() {
             j.fixed_view_mut::<6, 6>(0, self.layout.twists.start + 6 * k).copy_from(d);

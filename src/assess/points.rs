@@ -19,6 +19,13 @@ pub struct MeasuredPoint {
     pub readings: Vec<f64>,
 }
 
+impl MeasuredPoint {
+    /// A point of the tip where a robot has it at a stop, in the frame of its base.
+    pub fn on_tip(robot: &Robot, tip_point_m: &Vector3<f64>, stop: &Posture) -> Self {
+        Self { position_m: robot.base_from_tip_at(stop).transform(tip_point_m), readings: stop.readings.clone() }
+    }
+}
+
 /// The fit of the device's frame (6) and the reflector on the tip (3).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointFit {
@@ -261,8 +268,8 @@ impl PointFit {
     /// the device.
     fn left_by(&self, robot: &Robot, other: &Robot, points: &[MeasuredPoint]) -> Option<Vec<Vector3<f64>>> {
         let by_robot = |p: &MeasuredPoint| {
-            let on_tip = robot.base_from_tip(&p.readings).transform(&self.tip_point_m);
-            MeasuredPoint { position_m: self.device_from_base.transform(&on_tip), readings: p.readings.clone() }
+            let in_base = MeasuredPoint::on_tip(robot, &self.tip_point_m, &Posture::at(&p.readings));
+            MeasuredPoint { position_m: self.device_from_base.transform(&in_base.position_m), ..in_base }
         };
         Some(fit_points(other, &points.iter().map(by_robot).collect::<Vec<_>>())?.residuals_m)
     }

@@ -76,7 +76,7 @@ impl FlangeErrors {
         let scatter = noise.scatter(&by_readings(&whole, &samples));
         let scatter_m = scatter.variance.sqrt();
         let model_m = model.sigma_m(&samples).hypot(scatter_m);
-        let in_flange = |k: usize| exact(&whole, &samples[k]).rotation.transpose() * nominal.residuals_m[k];
+        let in_flange = |k: usize| whole.base_from_tip_at(&samples[k]).rotation.transpose() * nominal.residuals_m[k];
         let interval = |known: &dyn Fn(usize) -> Vector3<f64>| model.interval_m(&samples, known, scatter);
         Some(Self {
             nominal_m: model_m.hypot(nominal.rms_m),
@@ -97,9 +97,8 @@ impl FlangeErrors {
 
 /// The nominal robot over a corrected one at samples, with a base and a tool that fit best; `None` where none can be found.
 pub(super) fn nominal_laid_over(corrected: &Robot, samples: &[Posture]) -> Option<PointFit> {
-    let point =
-        |s: &Posture| MeasuredPoint { position_m: exact(corrected, s).translation, readings: s.readings.clone() };
-    lay_over(&Robot::nominal(corrected.chain.clone()), &samples.iter().map(point).collect::<Vec<_>>())
+    let flange = samples.iter().map(|stop| MeasuredPoint::on_tip(corrected, &Vector3::zeros(), stop));
+    lay_over(&Robot::nominal(corrected.chain.clone()), &flange.collect::<Vec<_>>())
 }
 
 /// The robot with some of its terms.
@@ -109,13 +108,9 @@ fn with(robot: &Robot, kept: impl Fn(Term) -> bool) -> Robot {
     robot
 }
 
-fn exact(robot: &Robot, stop: &Posture) -> crate::geom::Pose {
-    robot.pose_at(stop, &vec![0.0; stop.readings.len()])
-}
-
 /// How the flange of a second robot stands to that of a first, in the frame of the flange, right on average over the stops, m.
 fn displacements(a: &Robot, b: &Robot, samples: &[Posture], stops: &[Posture]) -> Vec<Vector3<f64>> {
-    let twist = |s: &Posture| (exact(a, s).inverse() * exact(b, s)).log();
+    let twist = |s: &Posture| (a.base_from_tip_at(s).inverse() * b.base_from_tip_at(s)).log();
     let mean = stops.iter().map(twist).sum::<Vector6<f64>>() / stops.len().max(1) as f64;
     samples.iter().map(|s| (twist(s) - mean).fixed_rows::<3>(0).into_owned()).collect()
 }

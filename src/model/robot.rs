@@ -79,7 +79,12 @@ impl Robot {
 
     /// Pose of the tip for exact readings at a stop of unknown approach.
     pub fn base_from_tip(&self, readings: &[f64]) -> Pose {
-        self.pose_at(&Posture::at(readings), &vec![0.0; readings.len()])
+        self.base_from_tip_at(&Posture::at(readings))
+    }
+
+    /// Pose of the tip for exact readings at a stop.
+    pub fn base_from_tip_at(&self, stop: &Posture) -> Pose {
+        self.pose_at(stop, &vec![0.0; stop.readings.len()])
     }
 
     /// Pose of the tip at a stop whose true positions lie `noise` (rad or m) beside what readings and terms say.

@@ -278,7 +278,7 @@ impl<'a> Work<'a> {
         let kind = &kind;
         let meant = reach(self.models.from, &self.limits, &held, programmed_before.as_deref()).stop(&programmed);
         let moved = self.frames.as_ref().map_or_else(|| Ok(Moved::none()), |f| f.moved(kind))?;
-        let taught = self.models.from.pose_at(&meant, &vec![0.0; programmed.len()]);
+        let taught = self.models.from.base_from_tip_at(&meant);
         let taught = self.models.beyond(0, &programmed, 1.0, taught);
         let wanted = self.models.beyond(1, &programmed, -1.0, moved.applied(&taught));
         let to = reach(self.models.to, &self.limits, &held, corrected_before.as_deref());
@@ -289,7 +289,7 @@ impl<'a> Work<'a> {
             *place = Some((programmed.clone(), stands));
         }
         let corrected = corrected?;
-        let pose_at = |q: &[f64]| self.models.to.pose_at(&to.stop(q), &vec![0.0; q.len()]);
+        let pose_at = |q: &[f64]| self.models.to.base_from_tip_at(&to.stop(q));
         let at_tool = |flange: Pose| flange * moved.flange_from_tool;
         let (turn_rad, shift_m) = at_tool(pose_at(&programmed)).distance(&at_tool(wanted));
         let mut written = None;
@@ -356,7 +356,7 @@ impl<'a> Work<'a> {
             let (new, found) = displaced.edits(&base, &aim, &program.files);
             read = self.commanded(&(*work * found * tool.inverse()), held, &correction.corrected)?;
             edits = new;
-            let reached = self.models.to.pose_at(&to.stop(&read), &vec![0.0; read.len()]) * *tool;
+            let reached = self.models.to.base_from_tip_at(&to.stop(&read)) * *tool;
             (correction.residual_rad, correction.residual_m) = reached.distance(&wanted_tool);
             if correction.residual_m < 0.1 * RESIDUAL || displaced.turned.is_some() {
                 break;
@@ -415,7 +415,7 @@ impl<'a> Work<'a> {
         let (axes, q) = (free().count(), &stalled.readings);
         let is_within = free().all(|i| q[i] > self.limits[i].0 && q[i] < self.limits[i].1);
         if axes < 6 && is_within {
-            let (turn_rad, shift_m) = to.robot.pose_at(&to.stop(start), &vec![0.0; start.len()]).distance(wanted);
+            let (turn_rad, shift_m) = to.robot.base_from_tip_at(&to.stop(start)).distance(wanted);
             let errors = in_words(shift_m, turn_rad);
             let words = format!(
                 "{axes} joints that may move cannot take out all six errors of the tool: of {errors}, {remain} would remain, so that nothing of it is corrected (level foot and tool so that less of it is left, or teach this target on the real robot)"

@@ -187,10 +187,12 @@ impl Stated {
     /// How far what is judged and a nominal robot put a point of the tip apart at some readings, and at the stops of the series that the solution was
     /// found from, once frame and point are fitted: RMS, m.
     pub fn apart_from(&self, nominal: &Robot, on_tip: &Vector3<f64>, readings: &[Vec<f64>]) -> Option<[f64; 2]> {
-        let robots = [self.part.as_ref().unwrap_or(&self.found.robot), nominal];
-        let own = self.own_stops();
-        let apart = |at: &[Vec<f64>]| apart_m(robots, on_tip, at.iter().map(Vec::as_slice));
-        Some([apart(readings)?, apart(&own)?])
+        let judged = self.part.as_ref().unwrap_or(&self.found.robot);
+        let apart = |at: &[Vec<f64>]| {
+            let by_judged = at.iter().map(|q| MeasuredPoint::on_tip(judged, on_tip, &Posture::at(q)));
+            Some(fit_points(nominal, &by_judged.collect::<Vec<_>>())?.rms_m)
+        };
+        Some([apart(readings)?, apart(&self.own_stops())?])
     }
 
     /// The solution.
@@ -230,19 +232,10 @@ fn rms(lengths: impl Iterator<Item = f64>) -> f64 {
     if squares.is_empty() { 0.0 } else { root_mean_square(&squares) }
 }
 
-/// How far two robots put a point of the tip apart, RMS, m, once frame and point are fitted.
-fn apart_m<'a>([a, b]: [&Robot; 2], on_tip: &Vector3<f64>, readings: impl Iterator<Item = &'a [f64]>) -> Option<f64> {
-    let by_first = |readings: &[f64]| MeasuredPoint {
-        position_m: a.base_from_tip(readings).transform(on_tip),
-        readings: readings.to_vec(),
-    };
-    Some(fit_points(b, &readings.map(by_first).collect::<Vec<_>>())?.rms_m)
-}
-
 /// How the tip of a second robot stands to that of a first one, without what a tool takes up: body twists.
 fn displacements(a: &Robot, b: &Robot, stops: &[Posture]) -> Vec<Vector6<f64>> {
-    let tip = |robot: &Robot, stop: &Posture| robot.pose_at(stop, &vec![0.0; stop.readings.len()]);
-    let all: Vec<Vector6<f64>> = stops.iter().map(|stop| (tip(a, stop).inverse() * tip(b, stop)).log()).collect();
+    let twist = |stop| (a.base_from_tip_at(stop).inverse() * b.base_from_tip_at(stop)).log();
+    let all: Vec<Vector6<f64>> = stops.iter().map(twist).collect();
     let mean = all.iter().sum::<Vector6<f64>>() / all.len().max(1) as f64;
     all.into_iter().map(|twist| twist - mean).collect()
 }

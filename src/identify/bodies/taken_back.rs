@@ -12,7 +12,7 @@ fn misfit(adjustment: &Adjustment, k: usize) -> Option<f64> {
     let Adjustment { problem, state } = adjustment;
     let measured = &problem.body_measurements[k];
     let posture = problem.stops[measured.stop].posture.as_ref()?;
-    let tip = state.robot.pose_at(posture, &vec![0.0; posture.readings.len()]);
+    let tip = state.robot.base_from_tip_at(posture);
     Some(missed(&(measured.seen, tip), &(state.instruments[measured.instrument], state.bodies[measured.body])))
 }
 

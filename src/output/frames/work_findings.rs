@@ -38,7 +38,7 @@ pub fn from_below(
     let first = places.first()?;
     let is_flat = places.iter().all(|place| (place.z - first.z).abs() < limits.flat_places_m);
     let height = |posture: &Posture| {
-        let flange = work_from_base * robot.pose_at(posture, &vec![0.0; posture.readings.len()]);
+        let flange = work_from_base * robot.base_from_tip_at(posture);
         flange.translation.z - first.z
     };
     let is_below = touches.postures.iter().all(|posture| height(posture) < 0.0);

@@ -1,7 +1,10 @@
 //! Two solutions against each other over the workspace.
 
+use nalgebra::Vector3;
+
 use crate::assess::{MeasuredPoint, WorkspacePoint, fit_points, within_joint_limits};
 use crate::error::{Code, Error, Result};
+use crate::model::robot::Posture;
 use crate::output::restore::{FoundModel, entered_offsets, found_model};
 use crate::output::solution_json::SolutionRecord;
 use crate::problem::short_name;
@@ -104,10 +107,8 @@ fn difference(a: &FoundModel, b: &FoundModel, places: &[&[f64]]) -> Option<Diffe
         return None;
     }
     // The flange of the first as a device would see it; frame and point on the flange of the second are fitted.
-    let points: Vec<MeasuredPoint> = (places.iter())
-        .map(|q| MeasuredPoint { position_m: a.robot.base_from_tip(q).translation, readings: q.to_vec() })
-        .collect();
-    let fit = fit_points(&b.robot, &points)?;
+    let points = places.iter().map(|q| MeasuredPoint::on_tip(&a.robot, &Vector3::zeros(), &Posture::at(q)));
+    let fit = fit_points(&b.robot, &points.collect::<Vec<_>>())?;
     let (worst, worst_m) = (fit.residuals_m.iter().map(|r| r.norm()).enumerate()).max_by(|x, y| x.1.total_cmp(&y.1))?;
     let stated = || {
         let (a, b) = (a.flange()?, b.flange()?);

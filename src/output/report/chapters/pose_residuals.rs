@@ -39,7 +39,7 @@ fn residuals(r: &SolutionRecord) -> Option<Vec<PoseResidual<'_>>> {
     let of = |image: &ImageRecord| {
         let (readings, found) = image.readings.as_ref().zip(image.camera_from_plate.as_ref())?;
         let stop = Posture { readings: readings.clone(), approach: image.approach.clone() };
-        let flange = robot.pose_at(&stop, &vec![0.0; readings.len()]);
+        let flange = robot.base_from_tip_at(&stop);
         let (mounting, placement) = (r.mountings.get(image.mounting)?, r.placements.get(image.placement)?);
         let (mounting, placement) = (Pose::from(&mounting.pose), Pose::from(&placement.pose));
         let predicted = image.camera_mount.camera_from_plate(&mounting, &flange, &placement);
