@@ -76,8 +76,16 @@ fn is_no_chance([with, without]: [f64; 2], points: usize, limits: &Limits) -> bo
     log_chance((with - without) / with, freedom(points), POINT) <= most
 }
 
-/// A point that is off by so much less than the farthest may only be drawn along by it.
+/// Share of what the farthest is off below which a point may only be drawn along by it.
 const DRAWN_ALONG: f64 = 0.8;
+/// The same of markers: size and shape of a plate are drawn along with them.
+pub const MARKERS_DRAWN_ALONG: f64 = 0.5;
+
+/// Those that no other draws along, each with what it is off, by their share of what the farthest is off.
+pub fn farthest<T>(off: impl Iterator<Item = (T, f64)> + Clone, drawn_along: f64) -> impl Iterator<Item = T> {
+    let most = off.clone().map(|(_, off)| off).fold(0.0, f64::max);
+    off.filter(move |(_, off)| *off > drawn_along * most).map(|(of, _)| of)
+}
 
 /// All points beside the fit of some.
 struct Beside {
@@ -116,10 +124,8 @@ impl Beside {
 
     /// What was left out, and of the others beyond those that no other draws along by far more than they are off.
     fn with_the_farthest(&self, left_out: &[usize]) -> Vec<usize> {
-        let kept = self.beyond.iter().filter(|k| !left_out.contains(k));
-        let farthest_m = kept.clone().map(|k| self.off_m[*k]).fold(0.0, f64::max);
-        let far = kept.filter(|k| self.off_m[**k] > DRAWN_ALONG * farthest_m);
-        let mut all: Vec<usize> = left_out.iter().chain(far).copied().collect();
+        let kept = self.beyond.iter().filter(|k| !left_out.contains(k)).map(|k| (*k, self.off_m[*k]));
+        let mut all: Vec<usize> = left_out.iter().copied().chain(farthest(kept, DRAWN_ALONG)).collect();
         all.sort_unstable();
         all
     }
