@@ -69,17 +69,16 @@ struct Pair {
     index: usize,
     own: Pose,
     covariance: Matrix6<f64>,
+    /// Its inverse, where there is one.
+    information: Option<Matrix6<f64>>,
     other: Pose,
 }
 
-impl Pair {
-    /// Inverse of the covariance.
-    fn information(&self) -> Option<Matrix6<f64>> {
-        let unit = self.covariance.diagonal().map(|v| v.max(f64::MIN_POSITIVE).sqrt());
-        let scaled = Matrix6::from_fn(|i, k| self.covariance[(i, k)] / unit[i] / unit[k]);
-        let inverse = scaled.cholesky()?.inverse();
-        Some(Matrix6::from_fn(|i, k| inverse[(i, k)] / unit[i] / unit[k]))
-    }
+fn information(covariance: &Matrix6<f64>) -> Option<Matrix6<f64>> {
+    let unit = covariance.diagonal().map(|v| v.max(f64::MIN_POSITIVE).sqrt());
+    let scaled = Matrix6::from_fn(|i, k| covariance[(i, k)] / unit[i] / unit[k]);
+    let inverse = scaled.cholesky()?.inverse();
+    Some(Matrix6::from_fn(|i, k| inverse[(i, k)] / unit[i] / unit[k]))
 }
 
 /// Images of which both have a pose.
@@ -91,7 +90,8 @@ fn pairs(found: &StandAlone, others: &[(String, Pose)]) -> Vec<Pair> {
             let placed = &pose.as_ref()?.in_frame;
             let (_, other) = others.iter().find(|(n, _)| *n == image.name || *n == stem(&image.name))?;
             let (own, covariance) = (placed.plate_from_camera, placed.covariance);
-            Some(Pair { image: image.name.clone(), index, own, covariance, other: *other })
+            let information = information(&covariance);
+            Some(Pair { image: image.name.clone(), index, own, covariance, information, other: *other })
         })
         .collect()
 }
@@ -122,31 +122,35 @@ pub fn compare_poses(
     })?;
     let (mut scale, mut sigmas) = (0.0, [FIRST_M_PER_RAD, 1.0]);
     let unknowns = if body == OtherBody::Camera { 7 } else { 13 };
+    let equations_at = |x: &Pose, y: &Pose, scale: f64| -> Vec<Equation> {
+        pairs.iter().map(|pair| equation(pair, (x, y, scale), unknowns)).collect()
+    };
+    let mut equations = equations_at(&x, &y, scale);
     for _ in 0..ROUNDS {
-        let equations: Vec<Equation> = pairs.iter().map(|pair| equation(pair, (&x, &y, scale), unknowns)).collect();
         let Some(gain) = gain(&equations, sigmas) else { break };
-        let step = -equations.iter().zip(&gain).map(|((r, _), gain)| gain * r).sum::<DVector<f64>>();
+        let moved = |((r, _), gain): (&Equation, &DMatrix<f64>)| gain * DVector::from_column_slice(r.as_slice());
+        let step = -equations.iter().zip(&gain).map(moved).sum::<DVector<f64>>();
         x = x.perturbed(&step.fixed_rows::<6>(0).into_owned());
         scale += step[6];
         if unknowns > 7 {
             y = y.perturbed(&step.fixed_rows::<6>(7).into_owned());
         }
-        sigmas = rms(pairs.iter().map(|p| residual(p, (&x, &y, scale)))).map(|s| s.max(f64::MIN_POSITIVE.sqrt()));
+        equations = equations_at(&x, &y, scale);
+        sigmas = rms(&equations).map(|s| s.max(f64::MIN_POSITIVE.sqrt()));
     }
-    let twists: Vec<Vector6<f64>> = pairs.iter().map(|p| residual(p, (&x, &y, scale))).collect();
-    let equations: Vec<Equation> = pairs.iter().map(|pair| equation(pair, (&x, &y, scale), unknowns)).collect();
     let together = found.covariance_together()?;
     let expected =
         gain(&equations, sigmas).and_then(|gain| expected_squares(&pairs, &equations, &gain, together.as_ref()));
-    let squares = pairs.iter().zip(&twists).filter_map(|(p, e)| Some(e.dot(&(p.information()? * e)))).sum::<f64>();
+    let square = |(pair, (r, _)): (&Pair, &Equation)| Some(r.dot(&(pair.information? * r)));
+    let squares = pairs.iter().zip(&equations).filter_map(square).sum::<f64>();
     let normalised = expected.map_or(f64::NAN, |expected| squares / expected);
-    let rms = rms(twists.iter().copied());
-    let differences = pairs.into_iter().zip(twists).map(|(p, twist)| PoseDifference { image: p.image, twist });
+    let rms = rms(&equations);
+    let differences = pairs.into_iter().zip(equations).map(|(p, (twist, _))| PoseDifference { image: p.image, twist });
     Ok(PoseComparison { differences: differences.collect(), rms, relative_scale: scale, normalised })
 }
 
 /// Residual of a pose, and its derivative by the unknowns.
-type Equation = (DVector<f64>, DMatrix<f64>);
+type Equation = (Vector6<f64>, DMatrix<f64>);
 
 /// By how much the residual of each pose moves the unknowns, `(J' W J)^-1 J_k' W`; `None` where they are not told.
 fn gain(equations: &[Equation], sigmas: [f64; 2]) -> Option<Vec<DMatrix<f64>>> {
@@ -181,7 +185,7 @@ fn expected_squares(
     let moved: Vec<DMatrix<f64>> = (0..pairs.len()).map(moved).collect();
     let of_unknowns: DMatrix<f64> = moved.iter().zip(gain).map(|(moved, gain)| moved * gain.transpose()).sum();
     let of_pose = |(k, pair): (usize, &Pair)| {
-        let (information, j) = (dynamic(&pair.information()?), &equations[k].1);
+        let (information, j) = (dynamic(&pair.information?), &equations[k].1);
         let own = (&information * block(k, k)).trace();
         let taken_up = (&information * (j * &moved[k])).trace();
         Some(own - 2.0 * taken_up + (information * (j * &of_unknowns * j.transpose())).trace())
@@ -189,14 +193,13 @@ fn expected_squares(
     Some(pairs.iter().enumerate().filter_map(of_pose).sum()).filter(|sum: &f64| *sum > 0.0)
 }
 
-fn rms(twists: impl Iterator<Item = Vector6<f64>>) -> [f64; 2] {
-    let (mut sums, mut count) = ([0.0; 2], 0usize);
-    for twist in twists {
-        sums[0] += twist.fixed_rows::<3>(0).norm_squared() / 3.0;
-        sums[1] += twist.fixed_rows::<3>(3).norm_squared() / 3.0;
-        count += 1;
+fn rms(equations: &[Equation]) -> [f64; 2] {
+    let mut sums = [0.0; 2];
+    for (r, _) in equations {
+        sums[0] += r.fixed_rows::<3>(0).norm_squared() / 3.0;
+        sums[1] += r.fixed_rows::<3>(3).norm_squared() / 3.0;
     }
-    sums.map(|s| (s / count.max(1) as f64).sqrt())
+    sums.map(|s| (s / equations.len().max(1) as f64).sqrt())
 }
 
 /// `X` and `Y` to begin with: where the body is the camera, from one pose; else in closed form.
@@ -219,14 +222,13 @@ fn residual(pair: &Pair, (x, y, scale): (&Pose, &Pose, f64)) -> Vector6<f64> {
 /// Residual, and its derivative by `x`, `s` and `y`.
 fn equation(pair: &Pair, at: (&Pose, &Pose, f64), unknowns: usize) -> Equation {
     let (_, y, _) = at;
-    let r = residual(pair, at);
     let mut j = DMatrix::zeros(6, unknowns);
     j.fixed_view_mut::<6, 6>(0, 0).copy_from(&-adjoint(&(pair.other * y.inverse()).inverse()));
     j.fixed_view_mut::<3, 1>(0, 6).copy_from(&-(pair.own.rotation.transpose() * pair.own.translation));
     if unknowns > 7 {
         j.fixed_view_mut::<6, 6>(0, 7).copy_from(&adjoint(y));
     }
-    (DVector::from_column_slice(r.as_slice()), j)
+    (residual(pair, at), j)
 }
 
 #[cfg(test)]
@@ -249,7 +251,8 @@ mod tests {
                 let own = pose(f64::from(k));
                 let scaled = Pose::new(own.rotation, own.translation / (1.0 + scale));
                 let other = x.inverse() * scaled * *y;
-                Pair { image: format!("{k}"), index: k as usize, own, covariance: Matrix6::identity(), other }
+                let (covariance, information) = (Matrix6::identity(), Some(Matrix6::identity()));
+                Pair { image: format!("{k}"), index: k as usize, own, covariance, information, other }
             })
             .collect()
     }
@@ -295,7 +298,9 @@ mod tests {
         let (x, y) = (Pose::identity(), Pose::exp(&Vector6::new(0.05, 0.0, 0.1, 0.1, 0.2, -0.3)));
         let all = pairs(&x, &y, 0.0);
         let together = DMatrix::from_fn(48, 48, |i, k| 1e-6 * (f64::from(i == k) + f64::from(i % 6 == k % 6)));
-        let known: Vec<Pair> = all.into_iter().map(|p| Pair { covariance: Matrix6::identity() * 2e-6, ..p }).collect();
+        let covariance = Matrix6::identity() * 2e-6;
+        let information = information(&covariance);
+        let known: Vec<Pair> = all.into_iter().map(|p| Pair { covariance, information, ..p }).collect();
         let equations: Vec<Equation> = known.iter().map(|p| equation(p, (&x, &y, 0.0), 13)).collect();
         let gain = gain(&equations, [1.0, 1.0]).unwrap();
         let expected = |together| expected_squares(&known, &equations, &gain, together).unwrap();
