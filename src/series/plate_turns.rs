@@ -45,6 +45,11 @@ impl Plate {
         alike.turns()
     }
 
+    /// That of them by so many quarter turns.
+    pub fn turn_of_places(&self, quarters: u8) -> Option<PlateTurn> {
+        self.turns_of_places().into_iter().find(|turn| turn.quarters == quarters)
+    }
+
     fn turned(&self, quarters: u8) -> Option<PlateTurn> {
         let alike = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(b.abs());
         let ids = self.markers.iter().map(|marker| {

@@ -70,13 +70,10 @@ pub(in crate::identify) fn settled<'a>(
             let stop = &mut turned[view.series].stops[view.stop];
             stop.left_out = None;
             changed = true;
-            if let Some(turn) = series[view.series].plate.turns_of_places().iter().find(|t| t.quarters == quarters) {
-                turn_ids(stop, turn);
-            }
+            series[view.series].plate.turn_of_places(quarters).iter().for_each(|turn| turn_ids(stop, turn));
         }
         for (view, quarters) in views.iter().zip(quarters) {
-            let turn = turns[view.series].iter().find(|t| t.quarters == quarters);
-            let Some(turn) = turn else { continue };
+            let Some(turn) = turns[view.series].iter().find(|t| t.quarters == quarters) else { continue };
             turn_ids(&mut turned[view.series].stops[view.stop], turn);
             changed = true;
         }
@@ -93,11 +90,10 @@ fn turn_ids(stop: &mut MeasuredStop, turn: &PlateTurn) {
 fn with_open(series: &[MeasuredSeries], quarters: u8) -> Vec<MeasuredSeries> {
     let mut all = series.to_vec();
     for own in &mut all {
-        let turns = own.plate.turns_of_places();
-        let turn = turns.iter().find(|turn| turn.quarters == quarters);
+        let turn = own.plate.turn_of_places(quarters);
         for stop in own.stops.iter_mut().filter(|stop| stop.is_turn_open()) {
             stop.left_out = None;
-            turn.into_iter().for_each(|turn| turn_ids(stop, turn));
+            turn.iter().for_each(|turn| turn_ids(stop, turn));
         }
     }
     all
@@ -131,7 +127,7 @@ fn posed_as_they_are(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) 
     for quarters in 1..4 {
         let has_pose = |s: usize, k: usize| all.iter().any(|posed| (posed.series, posed.stop) == (s, k));
         let lacks = |(s, own): (usize, &MeasuredSeries)| {
-            let has_turn = own.plate.turns_of_places().iter().any(|turn| turn.quarters == quarters);
+            let has_turn = own.plate.turn_of_places(quarters).is_some();
             let open = own.stops.iter().enumerate().filter(|(_, stop)| stop.is_turn_open() && stop.readings.is_some());
             has_turn && open.into_iter().any(|(k, _)| !has_pose(s, k))
         };
