@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::flow::{Flow, Followed};
-use super::program::{Approach, Arrival, Left, MeantPosture, Program, Target, TargetKind, Way};
+use super::program::{Approach, Arrival, Left, MeantPosture, Program, Target, TargetKind};
 
 /// A target: its file, its first byte there, and which of the uses with different tools or work objects it is.
 type Place = (usize, usize, usize);
@@ -230,10 +230,7 @@ impl Itinerary {
     }
 
     fn arrive(&mut self, index: usize, kind: &TargetKind, now: &Stands) {
-        let posture = match kind {
-            TargetKind::Pose(pose) => pose.posture.clone(),
-            TargetKind::Joints(_) => MeantPosture::ByWay(Way::Joints),
-        };
+        let posture = kind.posture();
         let known = self.arrivals.entry(index).or_default();
         for stand in &now.0 {
             let arrival = (*stand, posture.clone());

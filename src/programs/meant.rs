@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::posture::{Before, Finder, Known, same_posture};
-use super::program::{Approach, Arrival, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood, Way};
+use super::program::{Approach, Arrival, Heed, MeantPosture, PoseTarget, Program, Target, TargetKind, Understood};
 use super::reason::{LeftReason, Why};
 use crate::model::robot::Robot;
 
@@ -90,11 +90,7 @@ fn arrivals(target: &Target) -> Vec<Arrival> {
     if !target.arrivals.is_empty() {
         return target.arrivals.clone();
     }
-    let posture = match &target.kind {
-        TargetKind::Pose(pose) => pose.posture.clone(),
-        TargetKind::Joints(_) => MeantPosture::ByWay(Way::Joints),
-    };
-    vec![Arrival { from: target.approach, posture }]
+    vec![Arrival { from: target.approach, posture: target.kind.posture() }]
 }
 
 struct Meaning<'a> {
@@ -157,9 +153,9 @@ impl Meaning<'_> {
         match &self.targets[k].kind {
             TargetKind::Joints(_) => true,
             TargetKind::Pose(pose) => match arrival.posture {
-                MeantPosture::Coded(..) | MeantPosture::Unheeded(..) | MeantPosture::Near(_) => true,
+                MeantPosture::Coded(.., heed) => heed != Heed::Unknown,
+                MeantPosture::Near(_) => true,
                 MeantPosture::ByWay(_) => pose.taught.is_some(),
-                MeantPosture::Either(..) => false,
             },
         }
     }

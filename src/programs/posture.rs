@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::codes::{Branch, Codes};
-use super::program::{MeantPosture, PoseTarget, Understood, Way};
+use super::program::{Heed, MeantPosture, PoseTarget, Understood, Way};
 use super::reason::{LeftReason, Why};
 use crate::geom::Pose;
 use crate::model::inverse::{self, FARTHEST_STATED_RAD, FullTurns, POSTURE_STARTS, Reach, SAME_READING};
@@ -219,25 +219,23 @@ impl<'a> Finder<'a> {
     /// Joints by which the controller reaches a pose.
     pub fn joints(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>) -> Understood<Posture> {
         match (&pose.posture, &pose.taught) {
-            (MeantPosture::Coded(codes, axes, _), _) => self.by_codes(pose, held, before, (codes, axes)),
-            (MeantPosture::Either(codes, axes, way), _) => {
+            (MeantPosture::Coded(codes, axes, way, heed), _) => {
                 let coded = self.by_codes(pose, held, before, (codes, axes));
-                by_either(coded, self.by_approach(pose, held, before, *way))
-            }
-            (MeantPosture::Unheeded(codes, axes, way), _) => {
-                let coded = self.by_codes(pose, held, before, (codes, axes));
-                let Some(q) = before.readings.filter(|_| before.straight) else { return coded };
-                match (coded, self.by_tool(pose, held, q, *way)) {
-                    (Ok((coded, _)), Ok((by_tool, _))) if farthest(&coded, &by_tool) > SAME_READING => {
-                        Err(leads_elsewhere(codes))
+                match (heed, before.readings.filter(|_| before.straight)) {
+                    (Heed::Unknown, _) => by_either(coded, self.by_approach(pose, held, before, *way)),
+                    (Heed::Unheeded, Some(q)) => {
+                        let by_tool = self.by_tool(pose, held, q, *way);
+                        let is_other = match (&coded, &by_tool) {
+                            (Ok((coded, _)), Ok((by_tool, _))) => farthest(coded, by_tool) > SAME_READING,
+                            (Ok((coded, _)), Err(_)) => {
+                                *way == Way::Path && !path_leads(self.robot, &Self::fixed(pose, q), coded, held)
+                            }
+                            (Err(_), _) => false,
+                        };
+                        let found = coded.or_else(|why| by_tool.map_err(|_| why));
+                        if is_other { Err(leads_elsewhere(codes)) } else { found }
                     }
-                    (Ok((coded, _)), Err(_))
-                        if *way == Way::Path && !path_leads(self.robot, &Self::fixed(pose, q), &coded, held) =>
-                    {
-                        Err(leads_elsewhere(codes))
-                    }
-                    (Err(_), Ok(by_tool)) => Ok(by_tool),
-                    (coded, _) => coded,
+                    _ => coded,
                 }
             }
             (MeantPosture::Near(q), _) => {

@@ -160,6 +160,14 @@ impl TargetKind {
         }
     }
 
+    /// Which posture a motion to it means.
+    pub(super) fn posture(&self) -> MeantPosture {
+        match self {
+            Self::Pose(pose) => pose.posture.clone(),
+            Self::Joints(_) => MeantPosture::ByWay(Way::Joints),
+        }
+    }
+
     /// Where its first number stands in its file.
     pub(super) fn first_byte(&self) -> usize {
         let start = |f: &Field| match &f.place {
@@ -327,14 +335,21 @@ pub enum Way {
 pub enum MeantPosture {
     /// That to which the way from the target before leads.
     ByWay(Way),
-    /// That of the codes where the controller heeds them, else that to which the way leads: the text does not tell which.
-    Either(Codes, [usize; 6], Way),
     /// That next to these joint values, rad or m.
     Near(Vec<f64>),
-    /// That to which the way leads; codes, which the controller does not heed on it, must not say another one.
-    Unheeded(Codes, [usize; 6], Way),
-    /// That of the codes in the text, on this way.
-    Coded(Codes, [usize; 6], Way),
+    /// One of codes in the text, on this way.
+    Coded(Codes, [usize; 6], Way, Heed),
+}
+
+/// Whether a controller heeds codes of a posture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Heed {
+    /// The posture is that of the codes.
+    Heeded,
+    /// It is that to which the way leads; the codes must not say another one.
+    Unheeded,
+    /// It is one or the other: the text does not tell which.
+    Unknown,
 }
 
 impl MeantPosture {
@@ -342,26 +357,21 @@ impl MeantPosture {
     pub fn on(self, way: Way) -> Self {
         match self {
             Self::ByWay(_) => Self::ByWay(way),
-            Self::Either(codes, axes, _) => Self::Either(codes, axes, way),
-            Self::Unheeded(codes, axes, _) => Self::Unheeded(codes, axes, way),
-            Self::Coded(codes, axes, _) => Self::Coded(codes, axes, way),
+            Self::Coded(codes, axes, _, heed) => Self::Coded(codes, axes, way, heed),
             Self::Near(_) => self,
         }
     }
 
     fn heed_no_codes(&mut self) {
-        match self {
-            Self::Unheeded(.., way) | Self::Coded(.., way) | Self::Either(.., way) => *self = Self::ByWay(*way),
-            Self::ByWay(_) | Self::Near(_) => {}
+        if let Self::Coded(_, _, way, _) = self {
+            *self = Self::ByWay(*way);
         }
     }
 
     /// Codes that stand in the text, heeded or not.
     pub fn codes(&self) -> Option<(&Codes, &[usize; 6])> {
         match self {
-            Self::Coded(codes, axes, _) | Self::Either(codes, axes, _) | Self::Unheeded(codes, axes, _) => {
-                Some((codes, axes))
-            }
+            Self::Coded(codes, axes, ..) => Some((codes, axes)),
             Self::ByWay(_) | Self::Near(_) => None,
         }
     }

@@ -6,7 +6,7 @@ use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, matrix_from_rpy};
 use crate::programs::codes::PostureCode;
 use crate::programs::field::{Field, FieldPlace};
-use crate::programs::program::{JointTarget, MeantPosture, RotationFields, Way};
+use crate::programs::program::{Heed, JointTarget, MeantPosture, RotationFields, Way};
 use crate::programs::scan::Reader;
 
 const MM: f64 = 1e-3;
@@ -138,7 +138,7 @@ impl Aggregate {
         let (status, turn) = (self.code("S"), self.code("T"));
         match axes.get(..6).and_then(|a| <[usize; 6]>::try_from(a).ok()) {
             Some(six) if status.is_some() || turn.is_some() => {
-                MeantPosture::Coded(crate::programs::codes::Codes::Krl { status, turn }, six, Way::Joints)
+                MeantPosture::Coded(crate::programs::codes::Codes::Krl { status, turn }, six, Way::Joints, Heed::Heeded)
             }
             _ => MeantPosture::ByWay(Way::Joints),
         }

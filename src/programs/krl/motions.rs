@@ -6,7 +6,7 @@ use super::frames::Frames;
 use super::moves::NULL_FRAME;
 use super::{EXTERNAL_NAMES, Module, POSE_NAMES, Value};
 use crate::error::{Code, Error, Result};
-use crate::programs::program::{MeantPosture, Target, TargetKind, Understood, Way};
+use crate::programs::program::{Heed, MeantPosture, Target, TargetKind, Understood, Way};
 use crate::programs::reason::{LeftReason, Why};
 use crate::programs::scan::Reader;
 
@@ -29,7 +29,9 @@ fn posture_of(motion: &str, stated: MeantPosture) -> MeantPosture {
         _ => Way::Path,
     };
     match stated {
-        MeantPosture::Coded(codes, axes, _) if way != Way::Joints => MeantPosture::Unheeded(codes, axes, way),
+        MeantPosture::Coded(codes, axes, ..) if way != Way::Joints => {
+            MeantPosture::Coded(codes, axes, way, Heed::Unheeded)
+        }
         stated => stated.on(way),
     }
 }

@@ -28,7 +28,7 @@ use super::flow::{Places, settled};
 use super::itinerary::Itinerary;
 use super::names::{plain_error, plain_names};
 use super::program::{
-    Approach, DisplacedTarget, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
+    Approach, DisplacedTarget, Heed, JointTarget, Left, MeantPosture, PoseTarget, Program, RotationFields, Target,
     TargetKind, Understood, Way,
 };
 use super::reason::{DeclaredPoint, LeftReason, Why};
@@ -292,7 +292,9 @@ impl Task<'_> {
         };
         pose.posture = match (*self.switching.now().watched[usize::from(!is_of_joints(&upper))].value(), pose.posture) {
             (Watched::Off, _) => MeantPosture::ByWay(way),
-            (Watched::Unknown, MeantPosture::Coded(codes, axes, _)) => MeantPosture::Either(codes, axes, way),
+            (Watched::Unknown, MeantPosture::Coded(codes, axes, ..)) => {
+                MeantPosture::Coded(codes, axes, way, Heed::Unknown)
+            }
             (_, posture) => posture.on(way),
         };
         Ok(TargetKind::Pose(pose))
@@ -410,7 +412,7 @@ impl Task<'_> {
             None => MeantPosture::ByWay(Way::Joints),
             Some(six) => {
                 let cf = cf.map(|(value, range)| PostureCode { file, range, value: value as i64 });
-                MeantPosture::Coded(Codes::Rapid(Box::new(cf)), six, Way::Joints)
+                MeantPosture::Coded(Codes::Rapid(Box::new(cf)), six, Way::Joints, Heed::Heeded)
             }
         };
         if let Some((axis, value)) = foreign_axis(&external, axes.len()).filter(|_| !self.setting.axes_apart) {
