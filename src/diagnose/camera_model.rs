@@ -1,7 +1,7 @@
 //! Does the camera model explain the images, with a pose of its own for every one of them?
 
 use super::given_camera::GivenCamera;
-use super::kind::{CheckContext, Kind, Quantity, Subject};
+use super::kind::{CheckContext, Kind, Quantity};
 use crate::error::Code;
 use crate::problem::Problem;
 
@@ -27,10 +27,6 @@ pub(super) fn check(problem: &Problem, setting: &CheckContext) -> Option<CameraM
 impl Kind for CameraModelMisfit {
     fn code(&self) -> Code {
         Code::CameraModelMisfit
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {

@@ -1,6 +1,6 @@
 //! Is the corrected robot any good where no stop was?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Weight};
 use crate::assess::{Accuracy, Uncertainty, extrapolation_m};
 use crate::error::Code;
 
@@ -26,10 +26,6 @@ impl Kind for Extrapolates {
 
     fn weight(&self) -> Weight {
         Weight::Note
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {

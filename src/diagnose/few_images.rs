@@ -1,6 +1,6 @@
 //! Are there enough images of the robot?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Weight};
 use super::lost_images::LostImages;
 use crate::assess::Accuracy;
 use crate::error::Code;
@@ -33,10 +33,6 @@ impl Kind for FewImages {
 
     fn weight(&self) -> Weight {
         Weight::Note
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {

@@ -1,6 +1,6 @@
 //! Was the robot held near nominal because joint errors are no noise?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Weight};
 use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
@@ -26,10 +26,6 @@ impl Kind for HeldNearNominal {
 
     fn weight(&self) -> Weight {
         Weight::Note
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {

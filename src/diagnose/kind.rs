@@ -89,7 +89,9 @@ pub(super) trait Kind {
         Weight::Gate
     }
     /// What it is about.
-    fn subjects(&self) -> Vec<Subject>;
+    fn subjects(&self) -> Vec<Subject> {
+        Vec::new()
+    }
     /// Its numbers, in SI units but for px.
     fn quantities(&self) -> Vec<Quantity> {
         Vec::new()

@@ -4,7 +4,7 @@
 //! one does, with its interval over postures. And what the covariance states of the flange in the region of the stops: the intervals of both errors. One
 //! of them is enough, but for a nominal robot that predicts clearly better.
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Weight};
 use super::lost_images::LostImages;
 use crate::assess::{
     Accuracy, FlangeIntervals, Limits, Ratio, Uncertainty, bootstrap_ratio, by_cluster, cluster_of_images,
@@ -89,10 +89,6 @@ impl Kind for NoGain {
 
     fn weight(&self) -> Weight {
         self.weight
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {

@@ -1,6 +1,6 @@
 //! Do the images scatter as the noise model says?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Weight};
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::Code;
 
@@ -23,10 +23,6 @@ impl Kind for LargeScatter {
 
     fn weight(&self) -> Weight {
         Weight::Note
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {

@@ -1,6 +1,6 @@
 //! Is the corrected robot so much better than the nominal one that it is worth installing?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Weight};
 use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
@@ -30,10 +30,6 @@ impl Kind for SmallGain {
 
     fn weight(&self) -> Weight {
         Weight::Note
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {

@@ -1,6 +1,6 @@
 //! Is a joint noise that was stated the one that the data show?
 
-use super::kind::{CheckContext, Kind, Quantity, StatedNoise, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, StatedNoise, Weight};
 use crate::assess::{Accuracy, Limits, NORMAL_95};
 use crate::error::Code;
 use crate::fit::Fit;
@@ -61,10 +61,6 @@ impl Kind for NoiseContradicted {
 
     fn weight(&self) -> Weight {
         self.weight
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {

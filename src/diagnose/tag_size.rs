@@ -6,7 +6,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use super::kind::{CheckContext, Kind, Quantity, Weight};
 use super::slopes::slopes;
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
@@ -82,10 +82,6 @@ impl Kind for TagsOff {
 
     fn weight(&self) -> Weight {
         Weight::Note
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {

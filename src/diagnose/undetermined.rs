@@ -1,6 +1,6 @@
 //! Is the corrected robot known better than the nominal one misses?
 
-use super::kind::{CheckContext, Kind, Quantity, Subject};
+use super::kind::{CheckContext, Kind, Quantity};
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::Code;
 use crate::linalg::median;
@@ -29,10 +29,6 @@ pub(super) fn check(
 impl Kind for FlangeUndetermined {
     fn code(&self) -> Code {
         Code::FlangeUndetermined
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {

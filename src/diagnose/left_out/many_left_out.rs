@@ -1,7 +1,7 @@
 //! Do most images say something, whatever the others were left out for?
 
 use crate::assess::Limits;
-use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight};
+use crate::diagnose::kind::{CheckContext, Kind, Quantity, Weight};
 use crate::error::Code;
 use crate::problem::{Adjustment, Problem};
 
@@ -44,10 +44,6 @@ impl Kind for ManyLeftOut {
 
     fn weight(&self) -> Weight {
         Weight::Note
-    }
-
-    fn subjects(&self) -> Vec<Subject> {
-        Vec::new()
     }
 
     fn quantities(&self) -> Vec<Quantity> {
