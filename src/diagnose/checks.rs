@@ -247,16 +247,18 @@ impl<'a> Diagnosis<'a> {
         });
     }
 
-    /// Checks of what was left out.
+    /// Checks of the stand-alone camera poses, and of what was left out.
     ///
     /// # Errors
     /// Where too little is left for a result.
-    pub fn after_left_out(&mut self, adjustment: &Adjustment) -> Result<()> {
-        self.run(|stage, setting| match stage {
+    pub fn of_left_out(setting: CheckContext<'a>, adjustment: &Adjustment) -> Result<Self> {
+        let mut own = Self::new(setting);
+        own.after_free_poses(&adjustment.problem);
+        own.run(|stage, setting| match stage {
             Stage::LeftOut(check) => Some(check(adjustment, setting)),
             _ => None,
         });
-        self.refusal().map_or(Ok(()), Err)
+        own.refusal().map_or(Ok(own), Err)
     }
 
     /// Checks of the fit.

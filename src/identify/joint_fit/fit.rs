@@ -3,7 +3,7 @@
 use super::measured_lengths::{leave_all_out, leave_worst_out, take_agreeing};
 use super::moved_markers::let_go;
 use super::unpredicted::nothing_held_out;
-use crate::assess::{Limits, hold_out, hold_out_bodies, judge, refitted_near};
+use crate::assess::{Accuracy, ImageError, Limits, hold_out, hold_out_bodies, judge, refitted_near};
 use crate::diagnose::{CheckContext, Diagnosis, Finding, StatedNoise};
 use crate::error::{Code, Error, Result};
 use crate::fit::{Fit, FreePoses};
@@ -61,38 +61,11 @@ pub(in crate::identify) fn fit_model(
     known: Option<(FreeStart, Option<Adjustment>)>,
 ) -> Result<JointFit> {
     let _stage = stage(options.model.title());
-    let robot = options.model.robot_with(chain, options.harmonics);
-    let mut start = build(&robot, series, options.joint_noise == JointNoise::Estimated, &options.limits)?;
-    let Adjustment { problem, state } = &mut start;
-    options.selection.apply(&mut problem.layout, state, &options.limits)?;
-    let stated = options.selection.with_priors(&problem.layout)?;
-    problem.families.extend(Family::of_twists(&problem.layout, |c| stated.contains(&c)));
-    problem.families.extend(Family::of_gravity(&problem.layout, &state.robot, |c| stated.contains(&c)));
-    if options.marker_tolerance == MarkerTolerance::Estimated {
-        problem.noise.marker = vec![1.0; problem.plates.len()];
-    }
+    let start = unknowns(chain, series, options)?;
     let (known, near) = known.map_or((None, None), |(start, near)| (Some(start), near));
-    let has_same_lenses = known.as_ref().is_none_or(|known| known.has_lenses_of(state));
-    let left = match known {
-        Some(known) => match near.as_ref().filter(|_| !has_same_lenses) {
-            Some(near) => {
-                let (adjusted, left) = known.with_lenses_of(near, start, &options.limits)?;
-                start = adjusted;
-                left
-            }
-            None => {
-                known.carry_to(&mut start);
-                known
-            }
-        },
-        None if problem.images.is_empty() => FreeStart::of(&start, FreePoses::none(start.state.clone()), Vec::new()),
-        None => {
-            let stated = camera_starts(&problem.cameras, series);
-            let (adjusted, free, verdicts) = adjust_free_poses(start, &stated, &options.limits)?;
-            start = adjusted;
-            FreeStart::of(&start, free, verdicts)
-        }
-    };
+    let has_same_lenses = known.as_ref().is_none_or(|known| known.has_lenses_of(&start.state));
+    let other_lenses = near.as_ref().filter(|_| !has_same_lenses);
+    let (mut start, left) = with_free_poses(start, series, (known, other_lenses), &options.limits)?;
     let free = &left.free;
     let mut starts = left.verdicts.clone();
     let on_robot = start.problem.used_on_robot().count();
@@ -112,9 +85,7 @@ pub(in crate::identify) fn fit_model(
         fixed: &options.selection.fix,
         limits: &options.limits,
     };
-    let mut diagnosis = Diagnosis::new(context);
-    diagnosis.after_free_poses(&ended.adjustment().problem);
-    diagnosis.after_left_out(ended.adjustment())?;
+    Diagnosis::of_left_out(context, ended.adjustment())?;
     let Ended { status, iterations, fit } = ended;
     if status != Status::Converged {
         return Err(Error::new(Code::NotConverged, "joint fit", status.words(), status.remedy()));
@@ -124,6 +95,46 @@ pub(in crate::identify) fn fit_model(
     })?;
     let options = options.clone();
     Ok(JointFit { options, fit, start: left, starts, on_robot, before, status, iterations })
+}
+
+/// What is to be found, as the options say, nothing of it started yet.
+fn unknowns(chain: Chain, series: &[MeasuredSeries], options: &Options) -> Result<Adjustment> {
+    let robot = options.model.robot_with(chain, options.harmonics);
+    let mut start = build(&robot, series, options.joint_noise == JointNoise::Estimated, &options.limits)?;
+    let Adjustment { problem, state } = &mut start;
+    options.selection.apply(&mut problem.layout, state, &options.limits)?;
+    let stated = options.selection.with_priors(&problem.layout)?;
+    problem.families.extend(Family::of_twists(&problem.layout, |c| stated.contains(&c)));
+    problem.families.extend(Family::of_gravity(&problem.layout, &state.robot, |c| stated.contains(&c)));
+    if options.marker_tolerance == MarkerTolerance::Estimated {
+        problem.noise.marker = vec![1.0; problem.plates.len()];
+    }
+    Ok(start)
+}
+
+/// Cameras, plates and poses by the images alone: those that are known, adjusted to the lenses of another fit where these are others, else found.
+fn with_free_poses(
+    mut start: Adjustment,
+    series: &[MeasuredSeries],
+    (known, other_lenses): (Option<FreeStart>, Option<&Adjustment>),
+    limits: &Limits,
+) -> Result<(Adjustment, FreeStart)> {
+    let (free, verdicts) = match (known, other_lenses) {
+        (Some(known), Some(near)) => return known.with_lenses_of(near, start, limits),
+        (Some(known), None) => {
+            known.carry_to(&mut start);
+            return Ok((start, known));
+        }
+        (None, _) if start.problem.images.is_empty() => (FreePoses::none(start.state.clone()), Vec::new()),
+        (None, _) => {
+            let stated = camera_starts(&start.problem.cameras, series);
+            let (adjusted, free, verdicts) = adjust_free_poses(start, &stated, limits)?;
+            start = adjusted;
+            (free, verdicts)
+        }
+    };
+    let left = FreeStart::of(&start, free, verdicts);
+    Ok((start, left))
 }
 
 impl JointFit {
@@ -153,27 +164,10 @@ impl JointFit {
         let (free, limits, noise) = (start.free, &options.limits, options.joint_noise);
         let stated = noise.stated().zip(with_noise_found.as_ref());
         let stated_noise = stated.map(|(sigma, own)| StatedNoise { sigma, found: &own.fit, told: told.as_ref() });
-        let mut diagnosis = Diagnosis::new(CheckContext {
-            series,
-            free: &free,
-            on_robot,
-            stated_noise,
-            fixed: &options.selection.fix,
-            limits,
-        });
-        diagnosis.after_free_poses(&fit.problem);
-        diagnosis.after_left_out(&fit)?;
-        if estimator.is_two_stage() && !fit.problem.body_measurements.is_empty() {
-            return Err(of_images_alone());
-        }
-        let free_poses = estimator.is_two_stage().then(|| PoseStage::solved(&fit)).flatten();
-        let fitted = |left: LinearisedAdjustment| match estimator.is_two_stage() {
-            true => refit(&left.adjustment, free_poses.as_ref()?, estimator, noise),
-            false => Some(refitted_near(left)),
-        };
-        let (accuracy, held_out) = hold_out(fit.linear(), &fitted, limits)
-            .or_else(|| Some((hold_out_bodies(fit.linear(), limits)?, Vec::new())))
-            .ok_or_else(|| nothing_held_out("hold-out", &fit.problem, limits, noise))?;
+        let fixed = &options.selection.fix;
+        let context = CheckContext { series, free: &free, on_robot, stated_noise, fixed, limits };
+        let mut diagnosis = Diagnosis::of_left_out(context, &fit)?;
+        let (accuracy, held_out) = held_out(&fit, &options)?;
         {
             let _stage = stage("diagnoses");
             diagnosis.after_fit(&fit, &accuracy);
@@ -212,6 +206,22 @@ impl JointFit {
             iterations,
         })
     }
+}
+
+/// How accurate the estimator is for what it has not seen, with the images among it.
+fn held_out(fit: &Fit, options: &Options) -> Result<(Accuracy, Vec<(usize, ImageError)>)> {
+    let Options { estimator, joint_noise, ref limits, .. } = *options;
+    if estimator.is_two_stage() && !fit.problem.body_measurements.is_empty() {
+        return Err(of_images_alone());
+    }
+    let free_poses = estimator.is_two_stage().then(|| PoseStage::solved(fit)).flatten();
+    let fitted = |left: LinearisedAdjustment| match estimator.is_two_stage() {
+        true => refit(&left.adjustment, free_poses.as_ref()?, estimator, joint_noise),
+        false => Some(refitted_near(left)),
+    };
+    hold_out(fit.linear(), &fitted, limits)
+        .or_else(|| Some((hold_out_bodies(fit.linear(), limits)?, Vec::new())))
+        .ok_or_else(|| nothing_held_out("hold-out", &fit.problem, limits, joint_noise))
 }
 
 /// The fit, and what was known of the joint noise before some of it was set to none.
