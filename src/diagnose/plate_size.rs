@@ -119,7 +119,7 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     for (k, stated) in problem.plates.iter().enumerate() {
         let plate = problem.plate_name(k);
         let released = ReleasedSize::of(some.as_ref().unwrap_or(&fit.adjustment), k);
-        let beyond = |told: &Told, sigmas: f64| told.off.abs() > sigmas * told.sigma;
+        let beyond = |told: &SizeDifference, sigmas: f64| told.off.abs() > sigmas * told.sigma;
         // A size that is stated wrongly makes the links look worse than they are, and what they say less certain; a stretched plate as well.
         let is_suspected = || released.one_step().is_some_and(|told| beyond(&told, limits.plate_size_suspected));
         let uneven = uneven(&fit.adjustment, k, limits);
@@ -287,12 +287,12 @@ impl Kind for DoubtedSize {
 
 /// What images and links say of the size of a plate, less the stated one, and the standard deviation of that difference.
 #[derive(Clone, Copy)]
-struct Told {
+struct SizeDifference {
     off: f64,
     sigma: f64,
 }
 
-impl Told {
+impl SizeDifference {
     /// Standard deviation, relative to the size that is told: that of a size that tends to nothing tends to nothing, too.
     fn relative_sigma(&self) -> f64 {
         if self.off > -1.0 { self.sigma / (1.0 + self.off) } else { f64::INFINITY }
@@ -301,7 +301,7 @@ impl Told {
 
 /// What a fit with a free size says.
 struct Fitted {
-    told: Told,
+    told: SizeDifference,
     /// By how much the plate is longer along x and along y.
     along: Option<[f64; 2]>,
     in_order: InOrder,
@@ -364,7 +364,7 @@ impl<'a> ReleasedSize<'a> {
     }
 
     /// By one step from the fit with the stated size; `None` where the size is held, or nothing tells it.
-    fn one_step(&self) -> Option<Told> {
+    fn one_step(&self) -> Option<SizeDifference> {
         let at = self.column();
         let lin = self.adjustment.linearise()?;
         let linear = self.adjustment.linear(&lin);
@@ -402,13 +402,14 @@ impl<'a> ReleasedSize<'a> {
     }
 
     /// From a state, a step of the scale that it lacks, and the variance of the scale with next to nothing known of it beforehand.
-    fn told(&self, state: &State, step: f64, variance: f64) -> Option<Told> {
+    fn told(&self, state: &State, step: f64, variance: f64) -> Option<SizeDifference> {
         let column = &self.adjustment.problem.layout.columns[self.column()];
         let share = 1.0 - variance * UNKNOWN_SCALE.powi(-2);
         // The prior of next to nothing holds the scale back by the rest.
         let mode = state.plates[self.index].modes[SCALE] - column.prior_mean + step;
         let off = self.off(state) + step + mode * (share.recip() - 1.0);
-        (column.free && share > 0.0).then(|| Told { off, sigma: (variance / share + self.stated.powi(2)).sqrt() })
+        (column.free && share > 0.0)
+            .then(|| SizeDifference { off, sigma: (variance / share + self.stated.powi(2)).sqrt() })
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::equations::{Columns, Given};
 use super::robot::KnownRobot;
-use super::touch::{Seen, Touches};
+use super::touch::{TouchPlace, Touches};
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 
@@ -75,10 +75,10 @@ fn orientations(robot: &KnownRobot, touches: &Touches, limits: &Limits) -> Resul
     let mut groups: Vec<Vec<usize>> = vec![Vec::new(); touches.contacts.len() + 1];
     for (k, t) in touches.all.iter().enumerate() {
         // The tool is seen whole.
-        if matches!(t.seen, Seen::Pose(_)) {
+        if matches!(t.seen, TouchPlace::Pose(_)) {
             return Ok(());
         }
-        groups[if let Seen::Unknown(contact) = t.seen { contact } else { touches.contacts.len() }].push(k);
+        groups[if let TouchPlace::Unknown(contact) = t.seen { contact } else { touches.contacts.len() }].push(k);
     }
     for group in groups.iter().filter(|g| !g.is_empty()) {
         let rotations: Vec<_> =

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
 
 use super::robot::KnownRobot;
-use super::touch::{Seen, Touch, Touches};
+use super::touch::{Touch, TouchPlace, Touches};
 use crate::geom::{Pose, adjoint, skew};
 use crate::model::robot::Posture;
 
@@ -112,10 +112,10 @@ impl Unknowns {
     }
 
     /// Where a body is in the work object, as the written robot has it.
-    pub fn virtual_touch(&self, robot: &KnownRobot, posture: &Posture, body: usize, is_pose: bool) -> Seen {
+    pub fn virtual_touch(&self, robot: &KnownRobot, posture: &Posture, body: usize, is_pose: bool) -> TouchPlace {
         let tool = robot.at(posture).0 * self.tools[body];
         let seen = self.work.inverse() * tool;
-        if is_pose { Seen::Pose(seen) } else { Seen::Point(seen.translation) }
+        if is_pose { TouchPlace::Pose(seen) } else { TouchPlace::Point(seen.translation) }
     }
 }
 
@@ -151,14 +151,14 @@ pub(super) fn rows(
     unknowns: &Unknowns,
     columns: &Columns,
     posture: &Posture,
-    (body, seen): (usize, &Seen),
+    (body, seen): (usize, &TouchPlace),
 ) -> Rows {
     let (tip, kinematics) = robot.at(posture);
     let (tool, work) = (&unknowns.tools[body], &unknowns.work);
     let place = match seen {
-        Seen::Point(place) => Ok(*place),
-        Seen::Unknown(contact) => Ok(unknowns.places[*contact]),
-        Seen::Pose(pose) => Err(pose),
+        TouchPlace::Point(place) => Ok(*place),
+        TouchPlace::Unknown(contact) => Ok(unknowns.places[*contact]),
+        TouchPlace::Pose(pose) => Err(pose),
     };
     let k = if place.is_ok() { 3 } else { 6 };
     let mut a = DMatrix::zeros(k, columns.len);
@@ -172,7 +172,7 @@ pub(super) fn rows(
             let own = &columns.tools[body];
             let turned = if own.len() == 6 { tip.rotation * tool.rotation } else { tip.rotation };
             a.view_mut((0, own.start), (3, 3)).copy_from(&turned);
-            if let Seen::Unknown(contact) = seen {
+            if let TouchPlace::Unknown(contact) = seen {
                 a.view_mut((0, columns.places[*contact].start), (3, 3)).copy_from(&-work.rotation);
             }
         }
@@ -197,7 +197,7 @@ pub(super) fn rows(
 /// Sigmas of the rows of a measurement as stated.
 pub(super) fn sigmas(touch: &Touch) -> Vec<f64> {
     match touch.seen {
-        Seen::Pose(_) => [[touch.sigma_m; 3], [touch.sigma_rad; 3]].concat(),
+        TouchPlace::Pose(_) => [[touch.sigma_m; 3], [touch.sigma_rad; 3]].concat(),
         _ => vec![touch.sigma_m; 3],
     }
 }

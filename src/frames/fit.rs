@@ -10,7 +10,7 @@ use super::equations::{Columns, Given, Rows, Unknowns, rows, sigmas};
 use super::knowledge::{Knowledge, scatter_m};
 use super::robot::KnownRobot;
 use super::start::start;
-use super::touch::{Seen, Touch, Touches};
+use super::touch::{Touch, TouchPlace, Touches};
 use crate::assess::{Limits, root_mean_square};
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
@@ -282,9 +282,9 @@ fn judged(solved: &Solved) -> BTreeMap<usize, (DVector<f64>, f64)> {
 fn missed(robot: &KnownRobot, touches: &Touches, unknowns: &Unknowns, t: &Touch) -> Vector3<f64> {
     let tip = robot.at(&touches.postures[t.posture]).0;
     let place = match t.seen {
-        Seen::Point(place) => place,
-        Seen::Pose(pose) => pose.translation,
-        Seen::Unknown(contact) => unknowns.places[contact],
+        TouchPlace::Point(place) => place,
+        TouchPlace::Pose(pose) => pose.translation,
+        TouchPlace::Unknown(contact) => unknowns.places[contact],
     };
     unknowns.work.transform(&place) - tip.transform(&unknowns.tools[t.body].translation)
 }
@@ -322,7 +322,7 @@ pub fn fit(robot: &KnownRobot, touches: &Touches, given: &Given, limits: &Limits
         let others = work.converged(&unknowns, &used);
         let beyond = others.as_ref().and_then(|(u, s, solved)| {
             let sigmas = predicted(&work, u, *s, solved, worst)?;
-            let is_pose = matches!(touches.all[worst].seen, Seen::Pose(_));
+            let is_pose = matches!(touches.all[worst].seen, TouchPlace::Pose(_));
             (sigmas > limits.bounds().of_body(is_pose, false)).then_some(sigmas)
         });
         match (beyond, others) {

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::equations::{Columns, Unknowns, rows};
 use super::robot::KnownRobot;
-use super::touch::Seen;
+use super::touch::TouchPlace;
 use crate::geom::Pose;
 use crate::linalg::product;
 use crate::model::robot::Posture;
@@ -64,7 +64,8 @@ impl Knowledge {
     /// Covariance of the position of the tool in the work object at a posture, along the axes of the base, m^2.
     pub fn position_covariance(&self, robot: &KnownRobot, posture: &Posture, tool: &Pose, work: &Pose) -> Matrix3<f64> {
         let (columns, unknowns) = single(self.frames.nrows() - 6, tool, work);
-        let seen = Seen::Point(unknowns.work.inverse().transform(&robot.at(posture).0.transform(&tool.translation)));
+        let seen =
+            TouchPlace::Point(unknowns.work.inverse().transform(&robot.at(posture).0.transform(&tool.translation)));
         let rows = rows(robot, &unknowns, &columns, posture, (0, &seen));
         let a = rows.a.columns(0, columns.frames()).into_owned();
         let mixed = product(&product(&a, &self.cross), &rows.g.transpose());
@@ -78,7 +79,8 @@ impl Knowledge {
     /// Where the tool is beside where the robot as written has it, as far as the touches tell: `G' dtheta` along the axes of the base, m.
     pub fn error_m(&self, robot: &KnownRobot, posture: &Posture, tool: &Pose, work: &Pose) -> Vector3<f64> {
         let (columns, unknowns) = single(self.frames.nrows() - 6, tool, work);
-        let seen = Seen::Point(unknowns.work.inverse().transform(&robot.at(posture).0.transform(&tool.translation)));
+        let seen =
+            TouchPlace::Point(unknowns.work.inverse().transform(&robot.at(posture).0.transform(&tool.translation)));
         let rows = rows(robot, &unknowns, &columns, posture, (0, &seen));
         let e = &rows.g * &self.learned - rows.a.columns(0, columns.frames()) * &self.taken;
         Vector3::new(e[0], e[1], e[2])
@@ -93,7 +95,7 @@ impl Knowledge {
 /// What the joint noise does to the tool at a posture: root of the summed variances, m.
 pub fn scatter_m(robot: &KnownRobot, posture: &Posture, tool: &Pose) -> f64 {
     let (columns, unknowns) = single(3, tool, &Pose::identity());
-    let rows = rows(robot, &unknowns, &columns, posture, (0, &Seen::Point(Vector3::zeros())));
+    let rows = rows(robot, &unknowns, &columns, posture, (0, &TouchPlace::Point(Vector3::zeros())));
     rows.h.norm()
 }
 

@@ -29,4 +29,4 @@ pub use fit::{AsStated, FrameFit, Judged, closed_form, fit};
 pub use knowledge::Knowledge;
 pub use plan::{PlannedTouch, TouchPlan, TouchRequest, plan_touches};
 pub use robot::KnownRobot;
-pub use touch::{Seen, Touch, TouchedMarker, Touches};
+pub use touch::{Touch, TouchPlace, TouchedMarker, Touches};

@@ -12,7 +12,7 @@ use super::absorbed::{absorbed, region};
 use super::determined::extents_m;
 use super::equations::{Columns, Unknowns, rows};
 use super::robot::KnownRobot;
-use super::touch::Seen;
+use super::touch::TouchPlace;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
@@ -129,7 +129,7 @@ pub fn plan_touches(robot: &KnownRobot, request: &TouchRequest, limits: &Limits)
 
 impl Search<'_> {
     /// `[A, G'L]` and `V` of a point at a posture.
-    fn rows(&self, posture: &Posture, place: &Seen) -> (DMatrix<f64>, Matrix3<f64>) {
+    fn rows(&self, posture: &Posture, place: &TouchPlace) -> (DMatrix<f64>, Matrix3<f64>) {
         let rows = rows(self.robot, &self.unknowns, &self.columns, posture, (0, place));
         let (x, z) = (self.columns.len, self.absorbed.ncols());
         let mut j = DMatrix::zeros(3, x + z);
@@ -159,7 +159,7 @@ impl Search<'_> {
                 let wanted = base_from_tool * self.request.tool.inverse();
                 let Some(start) = self.robot.stops.get(k % self.robot.stops.len().max(1)) else { continue };
                 let Some(readings) = solve_from(exported, &limits, &wanted, &start.readings) else { continue };
-                let (j, v) = self.rows(&Posture::at(&readings), &Seen::Point(*place));
+                let (j, v) = self.rows(&Posture::at(&readings), &TouchPlace::Point(*place));
                 found.push(Candidate { point, readings, j, v });
             }
         }
@@ -229,7 +229,7 @@ impl Search<'_> {
         let wanted = self.robot.at(&Posture::at(&touch.readings)).0;
         // A joint at its limit cannot give way to the backlash.
         let readings = reach.solve_from(&wanted, &touch.readings).unwrap_or_else(|_| touch.readings.clone());
-        let (j, v) = self.rows(&reach.stop(&readings), &Seen::Point(self.request.points[touch.point].1));
+        let (j, v) = self.rows(&reach.stop(&readings), &TouchPlace::Point(self.request.points[touch.point].1));
         Candidate { point: touch.point, readings, j, v }
     }
 

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::equations::{Columns, Given, Unknowns};
 use super::robot::KnownRobot;
-use super::touch::{Seen, Touches};
+use super::touch::{TouchPlace, Touches};
 use crate::assess::{MeasuredPoint, fit_points};
 use crate::geom::{Pose, project_to_so3, rigid_fit};
 use crate::linalg::SymmetricFactor;
@@ -20,12 +20,12 @@ fn linear(tips: &[Pose], touches: &Touches, work: Option<&Pose>) -> Option<[Vec<
         let mut a = DMatrix::zeros(3, n);
         a.view_mut((0, 3 * t.body), (3, 3)).copy_from(&tip.rotation);
         let known = match (t.seen, work) {
-            (Seen::Unknown(contact), _) => {
+            (TouchPlace::Unknown(contact), _) => {
                 a.view_mut((0, 3 * (bodies + contact)), (3, 3)).copy_from(&-Matrix3::identity());
                 Vector3::zeros()
             }
-            (Seen::Point(place), Some(work)) => work.transform(&place),
-            (Seen::Pose(pose), Some(work)) => work.transform(&pose.translation),
+            (TouchPlace::Point(place), Some(work)) => work.transform(&place),
+            (TouchPlace::Pose(pose), Some(work)) => work.transform(&pose.translation),
             (_, None) => continue,
         };
         information += a.tr_mul(&a);
@@ -93,7 +93,7 @@ pub(super) fn start(robot: &KnownRobot, touches: &Touches, columns: &Columns, gi
     };
     let rotation = |body: usize| {
         let turned = touches.all.iter().filter_map(|t| match t.seen {
-            Seen::Pose(pose) if t.body == body => {
+            TouchPlace::Pose(pose) if t.body == body => {
                 Some(tips[t.posture].rotation.transpose() * work.rotation * pose.rotation)
             }
             _ => None,
@@ -107,7 +107,7 @@ pub(super) fn start(robot: &KnownRobot, touches: &Touches, columns: &Columns, gi
     let mut places: Vec<Vector3<f64>> = places.iter().map(|p| work.inverse().transform(p)).collect();
     if given.tool.is_some() {
         for (contact, place) in places.iter_mut().enumerate() {
-            let touching = touches.all.iter().find(|t| t.seen == Seen::Unknown(contact))?;
+            let touching = touches.all.iter().find(|t| t.seen == TouchPlace::Unknown(contact))?;
             *place = work.inverse().transform(&tips[touching.posture].transform(&points[touching.body]));
         }
     }

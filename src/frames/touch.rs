@@ -22,7 +22,7 @@ pub struct TouchedMarker {
 
 /// Where a touch says that the body was.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Seen {
+pub enum TouchPlace {
     /// Its origin in the work object, m.
     Point(Vector3<f64>),
     /// Its pose in the work object.
@@ -41,7 +41,7 @@ pub struct Touch {
     /// Index of the body.
     pub body: usize,
     /// Where it was.
-    pub seen: Seen,
+    pub seen: TouchPlace,
     /// Stated sigma of a coordinate, m.
     pub sigma_m: f64,
     /// Stated sigma of the rotation about an axis, rad; of poses.
@@ -87,7 +87,7 @@ impl Touches {
                     ));
                 };
                 let seen = match (b.kind, b.seen) {
-                    (InstrumentKind::Socket, _) => Seen::Unknown(intern(&mut touches.contacts, &b.instrument)),
+                    (InstrumentKind::Socket, _) => TouchPlace::Unknown(intern(&mut touches.contacts, &b.instrument)),
                     (_, seen) => {
                         let frame = touches.frame.get_or_insert_with(|| b.instrument.clone());
                         if *frame != b.instrument {
@@ -96,8 +96,8 @@ impl Touches {
                             return Err(Error::new(Code::SeriesDisagree, place(), what, remedy));
                         }
                         match seen {
-                            BodySeen::Point(point) => Seen::Point(point),
-                            BodySeen::Pose(pose) => Seen::Pose(pose),
+                            BodySeen::Point(point) => TouchPlace::Point(point),
+                            BodySeen::Pose(pose) => TouchPlace::Pose(pose),
                         }
                     }
                 };
@@ -131,7 +131,7 @@ impl Touches {
     pub fn move_to_found(&mut self, markers: &[TouchedMarker]) -> Vec<f64> {
         let mut moved = Vec::new();
         for touch in &mut self.all {
-            let Seen::Point(place) = &mut touch.seen else { continue };
+            let TouchPlace::Point(place) = &mut touch.seen else { continue };
             let away = |m: &&TouchedMarker| (m.nominal - *place).norm();
             let nearest = markers.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
             if let Some(marker) = nearest.filter(|m| away(m) <= AT_MARKER_M) {
@@ -144,15 +144,15 @@ impl Touches {
 
     /// True where the orientation of a body was seen, too.
     pub fn is_pose(&self, body: usize) -> bool {
-        self.all.iter().any(|t| t.body == body && matches!(t.seen, Seen::Pose(_)))
+        self.all.iter().any(|t| t.body == body && matches!(t.seen, TouchPlace::Pose(_)))
     }
 
     /// Measurements at known places.
     pub fn placed(&self) -> impl Iterator<Item = (&Touch, Vector3<f64>)> {
         self.all.iter().filter_map(|t| match t.seen {
-            Seen::Point(place) => Some((t, place)),
-            Seen::Pose(pose) => Some((t, pose.translation)),
-            Seen::Unknown(_) => None,
+            TouchPlace::Point(place) => Some((t, place)),
+            TouchPlace::Pose(pose) => Some((t, pose.translation)),
+            TouchPlace::Unknown(_) => None,
         })
     }
 }

@@ -1,6 +1,6 @@
 //! Identified series to a solution: the steps in their order, and in rounds where a better robot tells postures anew.
 
-use super::controller::computed_postures::{Before, Told, told_by_seen};
+use super::controller::computed_postures::{Before, ChosenPostures, told_by_seen};
 use super::controller::tool::tool_in_poses;
 use super::estimator::Estimator;
 use super::joint_fit::fit::JointFit;
@@ -46,7 +46,7 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
         let (again, Some(found)) = told_postures(&chosen.widest, fitted, options) else { break };
         // Terms enough to fit any choice do not close what was open before.
         let is_open = found.is_open || of_postures.is_some_and(|before| before.is_open);
-        of_postures = Some(Told { is_open, ..found });
+        of_postures = Some(ChosenPostures { is_open, ..found });
         if found.changed == 0 {
             break;
         }
@@ -89,7 +89,7 @@ fn told_postures(
     robot: &Robot,
     series: (&[MeasuredSeries], Before),
     options: &Options,
-) -> (Vec<MeasuredSeries>, Option<Told>) {
+) -> (Vec<MeasuredSeries>, Option<ChosenPostures>) {
     let (told, found) = told_by_seen(robot, series, &options.limits, |start| selected(start, options));
     (told.into_owned(), found)
 }

@@ -15,7 +15,7 @@ const AT_START: f64 = 1e-6;
 
 /// Whether the text tells where a reading stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Told {
+enum ReadingKnown {
     No,
     /// It would with `--start`, which is not given.
     WithStart,
@@ -30,7 +30,7 @@ pub(super) struct Meant {
     /// Its readings, rad or m.
     pub readings: Vec<f64>,
     /// Whether the text tells where they stand, whichever way the robot comes.
-    told: Vec<Told>,
+    told: Vec<ReadingKnown>,
     /// True for readings that keep their value.
     pub held: Vec<bool>,
     /// How its posture is known.
@@ -200,9 +200,9 @@ impl Meaning<'_> {
     }
 
     /// Another way to a target tells this much of its readings: what was found with more is looked at again.
-    fn tells_no_more(&mut self, k: usize, told: &[Told]) {
+    fn tells_no_more(&mut self, k: usize, told: &[ReadingKnown]) {
         let Found::Meant(known, _) = &mut self.found[k] else { return };
-        let least: Vec<Told> = known.told.iter().zip(told).map(|(known, told)| *known.min(told)).collect();
+        let least: Vec<ReadingKnown> = known.told.iter().zip(told).map(|(known, told)| *known.min(told)).collect();
         if least != known.told {
             known.told = least;
             self.followed.remove(&Some(k));
@@ -251,32 +251,32 @@ impl Meaning<'_> {
     }
 
     /// Which readings of a target the text tells, be it with the target before or with `--start`.
-    fn told(&self, kind: &TargetKind, before: Option<&Meant>, origin: Approach) -> Vec<Told> {
-        let kept = |i: usize| before.map_or(Told::No, |b| b.told[i]).max(self.told_by_start(i, origin));
+    fn told(&self, kind: &TargetKind, before: Option<&Meant>, origin: Approach) -> Vec<ReadingKnown> {
+        let kept = |i: usize| before.map_or(ReadingKnown::No, |b| b.told[i]).max(self.told_by_start(i, origin));
         match kind {
             TargetKind::Joints(joints) => {
-                let one = |(i, q): (usize, &f64)| if q.is_finite() { Told::Yes } else { kept(i) };
+                let one = |(i, q): (usize, &f64)| if q.is_finite() { ReadingKnown::Yes } else { kept(i) };
                 joints.readings.iter().enumerate().map(one).collect()
             }
-            TargetKind::Pose(_) => vec![Told::Yes; self.held.len()],
+            TargetKind::Pose(_) => vec![ReadingKnown::Yes; self.held.len()],
         }
     }
 
     /// Where `--start` has an external axis, at the beginning of the program, or of a routine where no statement puts it elsewhere; rad or m.
     fn by_start(&self, reading: usize, origin: Approach) -> Option<f64> {
-        self.finder.start(reading).filter(|_| self.told_by_start(reading, origin) == Told::Yes)
+        self.finder.start(reading).filter(|_| self.told_by_start(reading, origin) == ReadingKnown::Yes)
     }
 
-    fn told_by_start(&self, reading: usize, origin: Approach) -> Told {
+    fn told_by_start(&self, reading: usize, origin: Approach) -> ReadingKnown {
         let counts = match origin {
             Approach::Begin => true,
             Approach::Call => self.stays[reading],
             Approach::From(_) | Approach::Beyond(_) | Approach::Unknown => false,
         };
         match self.finder.start(reading) {
-            _ if !counts => Told::No,
-            Some(_) => Told::Yes,
-            None => Told::WithStart,
+            _ if !counts => ReadingKnown::No,
+            Some(_) => ReadingKnown::Yes,
+            None => ReadingKnown::WithStart,
         }
     }
 
@@ -285,8 +285,8 @@ impl Meaning<'_> {
         let mut origins = BTreeSet::new();
         self.arrivals[k].iter().for_each(|a| self.origins(a.from, &mut BTreeSet::new(), &mut origins));
         origins.iter().all(|origin| match (origin, origin.target().map(|j| &self.found[j])) {
-            (Approach::From(_), Some(Found::Meant(meant, _))) => meant.told[reading] > Told::No,
-            _ => self.told_by_start(reading, *origin) > Told::No,
+            (Approach::From(_), Some(Found::Meant(meant, _))) => meant.told[reading] > ReadingKnown::No,
+            _ => self.told_by_start(reading, *origin) > ReadingKnown::No,
         })
     }
 
@@ -320,12 +320,12 @@ impl Meaning<'_> {
             TargetKind::Pose(pose) if pose.is_partial() => {
                 for (i, place) in pose.fixed.iter_mut().enumerate() {
                     if place.is_some_and(|value| !value.is_finite()) {
-                        let kept = before.filter(|b| b.told[i] == Told::Yes).map(|b| b.readings[i]);
+                        let kept = before.filter(|b| b.told[i] == ReadingKnown::Yes).map(|b| b.readings[i]);
                         *place = Some(kept.or(self.by_start(i, origin)).ok_or_else(|| self.axis_untold(k, i))?);
                     }
                 }
                 if pose.is_partial() {
-                    let is_told = |b: &&Meant| b.told.iter().all(|told| *told == Told::Yes);
+                    let is_told = |b: &&Meant| b.told.iter().all(|told| *told == ReadingKnown::Yes);
                     let before = before.filter(is_told).ok_or_else(unknown)?;
                     pose.complete(&self.controller.base_from_tip(&before.readings));
                 }

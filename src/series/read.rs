@@ -21,7 +21,7 @@ use super::run::Run;
 use super::spatial::SpatialFiles;
 use super::stop_index::StopIndex;
 use super::table::Table;
-use super::views::{CameraView, Seen, has_mixed_mounts};
+use super::views::{CameraView, WholeSeries, has_mixed_mounts};
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::files;
 
@@ -165,7 +165,7 @@ fn views_of(series: &mut Series, use_observations: bool) -> Result<Vec<Series>> 
         &series.manifest.cameras,
     )?;
     let Series { name, folder, manifest, stops, controller, .. } = &*series;
-    let all = Seen { series: name, folder, manifest, stops, controller: controller.as_ref() };
+    let all = WholeSeries { series: name, folder, manifest, stops, controller: controller.as_ref() };
     let views = all.views(&rows);
     if use_observations {
         require_names_of_their_own(&path, &views)?;

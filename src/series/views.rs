@@ -27,7 +27,7 @@ pub(super) struct CameraView {
 }
 
 /// All stops of a series, and where they come from.
-pub(super) struct Seen<'a> {
+pub(super) struct WholeSeries<'a> {
     pub series: &'a str,
     pub folder: &'a Path,
     pub manifest: &'a Manifest,
@@ -35,7 +35,7 @@ pub(super) struct Seen<'a> {
     pub controller: Option<&'a ControllerPoses>,
 }
 
-impl Seen<'_> {
+impl WholeSeries<'_> {
     /// The views of all cameras, by the rows of images.csv.
     pub fn views(&self, rows: &[ImageRow]) -> Vec<CameraView> {
         let unstated = [CameraSection::UNSTATED];

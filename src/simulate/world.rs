@@ -118,7 +118,7 @@ fn true_plate(request: &WorldRequest, rng: &mut impl Rng) -> Plate {
 }
 
 /// One accepted stop.
-struct Seen {
+struct AcceptedStop {
     readings: Vec<f64>,
     raw: Vec<f64>,
     noise: Vec<f64>,
@@ -137,7 +137,7 @@ struct World<'a> {
 }
 
 impl World<'_> {
-    fn next_view(&mut self, index: usize, before: Option<&[f64]>) -> Result<Seen> {
+    fn next_view(&mut self, index: usize, before: Option<&[f64]>) -> Result<AcceptedStop> {
         let request = self.request;
         let at = index % self.setup.plates.len();
         let kinds = &request.chain.reading_kinds;
@@ -158,7 +158,7 @@ impl World<'_> {
             markers.dedup();
             if is_given || markers.len() >= request.least_markers {
                 let observations = ImageObservations { image: image_name(index), observations: seen };
-                return Ok(Seen { readings, raw, noise, placement: at, camera_from_plate, observations });
+                return Ok(AcceptedStop { readings, raw, noise, placement: at, camera_from_plate, observations });
             }
         }
         Err(Error::new(
@@ -185,11 +185,11 @@ impl World<'_> {
         Ok(HeldOutRecord { readings, base_from_tip })
     }
 
-    fn into_series(self, seen: Vec<Seen>, held_out: Vec<HeldOutRecord>) -> SimulatedSeries {
+    fn into_series(self, seen: Vec<AcceptedStop>, held_out: Vec<HeldOutRecord>) -> SimulatedSeries {
         let request = self.request;
         let chain = &request.chain;
         let names = |at: usize| format!("placement_{at}");
-        let record = |s: &Seen| TrueStop {
+        let record = |s: &AcceptedStop| TrueStop {
             image: s.observations.image.clone(),
             placement: names(s.placement),
             joint_noise: s.noise.clone(),
@@ -214,7 +214,7 @@ impl World<'_> {
             stops: seen.iter().map(record).collect(),
             held_out,
         };
-        let stop = |s: &Seen| SeriesStop {
+        let stop = |s: &AcceptedStop| SeriesStop {
             image: s.observations.image.clone(),
             raw_readings: Some(s.raw.clone()),
             placement: names(s.placement),

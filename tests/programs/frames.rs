@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use robotcal::assess::Limits;
 use robotcal::diagnose::{Finding, Weight};
 use robotcal::error::Code;
-use robotcal::frames::{Given, KnownRobot, Seen, Touches, fit};
+use robotcal::frames::{Given, KnownRobot, TouchPlace, Touches, fit};
 use robotcal::geom::Pose;
 use robotcal::identify::{mirror_image, touch_mistake};
 use robotcal::model::inverse::{reading_limits, solve_from};
@@ -70,7 +70,7 @@ fn one_point(robot: &Robot, start: &[f64], count: usize, rng: &mut ChaCha8Rng) -
     let mut touches = toucher.places(&found, "unused", rng);
     touches.frame = None;
     touches.contacts = vec!["pin".into()];
-    touches.all.iter_mut().for_each(|t| t.seen = Seen::Unknown(0));
+    touches.all.iter_mut().for_each(|t| t.seen = TouchPlace::Unknown(0));
     touches
 }
 
@@ -119,8 +119,8 @@ fn a_wrong_touch_is_left_out_by_name_and_moves_nothing() {
     let mut touches = toucher.places(&q, "fixture", &mut rng);
     let clean = fit(&robot, &touches, &Given::default(), &Limits::default()).unwrap();
     assert!(clean.judged.iter().all(|j| !j.left_out));
-    let Seen::Point(place) = touches.all[7].seen else { unreachable!() };
-    touches.all[7].seen = Seen::Point(place + Vector3::new(0.0, 2e-3, 0.0));
+    let TouchPlace::Point(place) = touches.all[7].seen else { unreachable!() };
+    touches.all[7].seen = TouchPlace::Point(place + Vector3::new(0.0, 2e-3, 0.0));
     let found = fit(&robot, &touches, &Given::default(), &Limits::default()).unwrap();
     let left: Vec<usize> = (0..12).filter(|&k| found.judged[k].left_out).collect();
     assert_eq!(left, [7]);
@@ -139,7 +139,7 @@ fn touches_that_tell_nothing_are_refused_by_their_reason() {
     let with = |change: &dyn Fn(usize, Vector3<f64>) -> Vector3<f64>| {
         let mut touches = good.clone();
         for (k, t) in touches.all.iter_mut().enumerate() {
-            if let Seen::Point(p) = &mut t.seen {
+            if let TouchPlace::Point(p) = &mut t.seen {
                 *p = change(k, *p);
             }
         }
@@ -319,7 +319,7 @@ fn places_of_a_plane_that_were_touched_from_below_are_told() {
     for mirrored in [false, true] {
         let mut touches = touches.clone();
         for touch in touches.all.iter_mut().filter(|_| mirrored) {
-            let Seen::Point(place) = &mut touch.seen else { panic!("a place") };
+            let TouchPlace::Point(place) = &mut touch.seen else { panic!("a place") };
             place.y = -place.y;
         }
         let given = Given { tool: Some(tool), ..Given::default() };
@@ -482,7 +482,7 @@ fn joints_beside_the_chain_that_moved_between_touches_are_named() {
     };
     let mut touches = toucher(&[0.0, 0.0]).places(&q, "fixture", &mut rng);
     for (k, turn) in turns.iter().enumerate() {
-        touches.all[k].seen = Seen::Point(toucher(turn).touched(&q[k], &mut rng));
+        touches.all[k].seen = TouchPlace::Point(toucher(turn).touched(&q[k], &mut rng));
     }
     let head = "base = \"base_link\"\ntip = \"tool0\"\n[contact]\nsigma_m = 0.00005\nframe = \"fixture\"\n";
     let mut joints = world.truth.chain.readings.clone();
@@ -771,8 +771,8 @@ fn usual_mistakes_in_touches_are_named() {
         touch_mistake(&robot, &touches, &given, (&found, &limits)).map(Finding::from)
     };
     assert_eq!(named(&|_| ()), None, "good touches");
-    let place = |seen: &mut Seen, change: &dyn Fn(&mut Vector3<f64>)| {
-        if let Seen::Point(place) = seen {
+    let place = |seen: &mut TouchPlace, change: &dyn Fn(&mut Vector3<f64>)| {
+        if let TouchPlace::Point(place) = seen {
             change(place);
         }
     };
@@ -867,7 +867,7 @@ fn a_place_whose_touches_are_all_left_out_is_doubted() {
     };
     assert_eq!(doubted(&touches), None);
     for touch in &mut touches.all[..2] {
-        if let Seen::Point(place) = &mut touch.seen {
+        if let TouchPlace::Point(place) = &mut touch.seen {
             place.x += 3e-3;
         }
     }
@@ -888,7 +888,7 @@ fn of_few_touches_the_wrong_one_is_among_those_that_are_named() {
         let mut rng = rng(seed);
         let q = spread(&ranges(&robot.stops), 4, &mut rng);
         let mut touches = toucher.places(&q, "fixture", &mut rng);
-        if let Seen::Point(place) = &mut touches.all[1].seen {
+        if let TouchPlace::Point(place) = &mut touches.all[1].seen {
             place.z += 2e-3;
         }
         let found = fit(&robot, &touches, &given, &limits).unwrap();

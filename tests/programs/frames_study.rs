@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use robotcal::assess::Limits;
 use robotcal::calibration::{Ends, Inputs};
-use robotcal::frames::{Given, Knowledge, KnownRobot, Seen, TouchRequest, Touches, fit, plan_touches};
+use robotcal::frames::{Given, Knowledge, KnownRobot, TouchPlace, TouchRequest, Touches, fit, plan_touches};
 use robotcal::geom::{Pose, skew};
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::linalg::SymmetricFactor;
@@ -431,7 +431,7 @@ fn study_of_planned_touches() {
         let at = |all: &[(usize, Vec<f64>)], rng: &mut ChaCha8Rng| {
             let q: Vec<Vec<f64>> = all.iter().map(|(_, q)| q.clone()).collect();
             let mut touches = robots.toucher(&cell).places(&q, "fixture", rng);
-            touches.all.iter_mut().zip(all).for_each(|(t, (p, _))| t.seen = Seen::Point(points[*p].1));
+            touches.all.iter_mut().zip(all).for_each(|(t, (p, _))| t.seen = TouchPlace::Point(points[*p].1));
             robots.bound(&touches, &targets, &cell.planned_tool, &cell.work)
         };
         let chosen: Vec<(usize, Vec<f64>)> = planned.iter().map(|t| (t.point, t.readings.clone())).collect();

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use robotcal::frames::{Seen, Touch, Touches};
+use robotcal::frames::{Touch, TouchPlace, Touches};
 use robotcal::geom::Pose;
 use robotcal::model::robot::{Posture, Robot};
 use robotcal::series::JointsBeside;
@@ -50,7 +50,7 @@ impl Toucher<'_> {
             stop: format!("t{k:02}"),
             posture: k,
             body: 0,
-            seen: Seen::Point(self.touched(q, rng)),
+            seen: TouchPlace::Point(self.touched(q, rng)),
             sigma_m: self.sigma_m.max(1e-9),
             sigma_rad: 1e-4,
         };
@@ -89,9 +89,11 @@ pub fn write(folder: &Path, joints: &[String], touches: &Touches, head: &str) ->
             touches.postures[t.posture].readings.iter().map(|q| format!("{:.9}", q.to_degrees())).collect();
         writeln!(table, "{},{}", t.stop, q.join(",")).unwrap();
         match t.seen {
-            Seen::Point(p) => writeln!(contacts, "{},p{},{:.7},{:.7},{:.7}", t.stop, t.stop, p.x, p.y, p.z).unwrap(),
-            Seen::Unknown(c) => writeln!(contacts, "{},{},,,", t.stop, touches.contacts[c]).unwrap(),
-            Seen::Pose(_) => panic!("contacts are points"),
+            TouchPlace::Point(p) => {
+                writeln!(contacts, "{},p{},{:.7},{:.7},{:.7}", t.stop, t.stop, p.x, p.y, p.z).unwrap()
+            }
+            TouchPlace::Unknown(c) => writeln!(contacts, "{},{},,,", t.stop, touches.contacts[c]).unwrap(),
+            TouchPlace::Pose(_) => panic!("contacts are points"),
         }
     }
     std::fs::write(folder.join("joints.csv"), table).unwrap();

@@ -14,7 +14,7 @@ use crate::cli::results::show::read_solution;
 use crate::cli::terminal::say::{self, say, say_line};
 use crate::diagnose::{Mistake, Weight};
 use crate::error::{Code, Error, Notice, Result, closest_name};
-use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, Seen, Touches, fit};
+use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, TouchPlace, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
 
 use crate::identify::{leave_out_repeated_bodies, measure_bodies, mirror_image, touch_mistake};
@@ -427,9 +427,9 @@ fn tool_record(args: &FramesArgs, record: &SolutionRecord, fit: &FrameFit, touch
 fn touch_records(fit: &FrameFit, touches: &Touches) -> Vec<TouchRecord> {
     let record = |(t, judged): (&crate::frames::Touch, &crate::frames::Judged)| {
         let (at, place) = match t.seen {
-            Seen::Point(place) => (work_name(touches), place),
-            Seen::Pose(pose) => (work_name(touches), pose.translation),
-            Seen::Unknown(contact) => (touches.contacts[contact].clone(), fit.places[contact]),
+            TouchPlace::Point(place) => (work_name(touches), place),
+            TouchPlace::Pose(pose) => (work_name(touches), pose.translation),
+            TouchPlace::Unknown(contact) => (touches.contacts[contact].clone(), fit.places[contact]),
         };
         TouchRecord {
             stop: t.stop.clone(),

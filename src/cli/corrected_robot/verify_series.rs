@@ -43,7 +43,8 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
         let model = Model::of(args, inputs.chain.clone())?;
         let Observed { series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
         let zeros = zeros(args, &model, &files)?;
-        let seen = Seen { series: &with_added(series, &missing(zeros.as_ref())), files: &files, zeros: zeros.as_ref() };
+        let seen =
+            Verified { series: &with_added(series, &missing(zeros.as_ref())), files: &files, zeros: zeros.as_ref() };
         let images = match judged((&model.robot, &args.urdf), seen.series, &model.limits)? {
             JudgedSeries::Images(images) => images,
             JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
@@ -61,7 +62,7 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let zeros = zeros(args, &model, &files)?;
     let missing = missing(zeros.as_ref());
     let series = in_told_postures(&model.robot, &with_added(series, &missing), &model.limits);
-    let seen = Seen { series: &series, files: &files, zeros: zeros.as_ref() };
+    let seen = Verified { series: &series, files: &files, zeros: zeros.as_ref() };
     let images = match judged((&model.robot, &args.urdf), &series, &model.limits)? {
         JudgedSeries::Images(images) => images,
         JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
@@ -116,7 +117,7 @@ fn with_added(mut series: Vec<MeasuredSeries>, offsets: &[f64]) -> Vec<MeasuredS
 }
 
 /// What was measured.
-struct Seen<'a> {
+struct Verified<'a> {
     series: &'a [MeasuredSeries],
     files: &'a [InputFile],
     zeros: Option<&'a Zeros>,
@@ -126,7 +127,7 @@ struct Seen<'a> {
 fn weigh(
     args: &VerifyArgs,
     model: &Model,
-    (seen, images): (&Seen<'_>, &[&JudgedImage]),
+    (seen, images): (&Verified<'_>, &[&JudgedImage]),
     gain: Option<Gain<'_>>,
 ) -> Reasons {
     let Model { robot, stated, of_other, limits } = model;
@@ -152,7 +153,7 @@ fn weigh(
 }
 
 /// A model that is judged with its own zeros, which do not fit: there is no figure of it, and which zeros would fit is said.
-fn of_other_zeros(args: &VerifyArgs, model: &Model, seen: &Seen<'_>, other: &RobotOfOtherZeros) -> Result<Reasons> {
+fn of_other_zeros(args: &VerifyArgs, model: &Model, seen: &Verified<'_>, other: &RobotOfOtherZeros) -> Result<Reasons> {
     let urdf = &args.urdf;
     let with_these = judged((&other.robot, urdf), seen.series, &model.limits);
     say_line!(
@@ -176,7 +177,7 @@ fn of_other_zeros(args: &VerifyArgs, model: &Model, seen: &Seen<'_>, other: &Rob
 }
 
 /// The series with its readings taken the other way, where the model then misses no more than it may.
-fn by_other_readings(urdf: &Path, model: &Model, seen: &Seen<'_>) -> Option<FileFinding> {
+fn by_other_readings(urdf: &Path, model: &Model, seen: &Verified<'_>) -> Option<FileFinding> {
     let (zeros, stated) = (seen.zeros?, model.stated.as_ref()?);
     let series = with_added(seen.series.to_vec(), &zeros.instead());
     let images = verify_series(&model.robot, &series, &model.limits).ok()?.into_images();

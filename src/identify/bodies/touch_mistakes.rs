@@ -15,7 +15,7 @@ use super::points_start::each_place;
 use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, MistakeKind, RowsOf};
 use crate::error::Code;
-use crate::frames::{FrameFit, Given, KnownRobot, Seen, Touch, Touches, closed_form, fit};
+use crate::frames::{FrameFit, Given, KnownRobot, Touch, TouchPlace, Touches, closed_form, fit};
 use crate::geom::{Pose, log_so3, rigid_fit};
 use crate::identify::mistakes::likeliest::{Explained, likeliest};
 use crate::identify::mistakes::misread::all_misread;
@@ -77,7 +77,7 @@ impl What {
             Some(all.filter(|(k, touch)| is(*k, touch)).map(|(_, touch)| touch.stop.clone()).collect())
         };
         match self {
-            Self::Place(place) => at(&|_, touch| touch.seen == Seen::Point(*place)),
+            Self::Place(place) => at(&|_, touch| touch.seen == TouchPlace::Point(*place)),
             Self::Touch(one, _) => at(&|k, _| k == *one),
             _ => None,
         }
@@ -250,7 +250,7 @@ fn explains(fit: &FrameFit, what: &What, (found, limits): (&FrameFit, &Limits)) 
 /// Every known place as unknown, and that of every touch alone.
 fn other_places(touches: &Touches) -> [Vec<(Touches, What)>; 2] {
     let places = known_places(touches.all.iter()).into_iter().map(|place| {
-        let (other, _) = with_unknown_places(touches, |touch| touch.seen == Seen::Point(place));
+        let (other, _) = with_unknown_places(touches, |touch| touch.seen == TouchPlace::Point(place));
         (other, What::Place(place))
     });
     let single = (0..touches.all.len()).filter_map(|k| of_another_place(touches, k));
@@ -322,9 +322,9 @@ fn read_otherwise(robot: &KnownRobot, touches: &Touches) -> impl Iterator<Item =
         let mut undone = touches.clone();
         for touch in &mut undone.all {
             touch.seen = match touch.seen {
-                Seen::Point(point) => seen(misread.undone(BodySeen::Point(point))?),
-                Seen::Pose(pose) => seen(misread.undone(BodySeen::Pose(pose))?),
-                unknown @ Seen::Unknown(_) => unknown,
+                TouchPlace::Point(point) => seen(misread.undone(BodySeen::Point(point))?),
+                TouchPlace::Pose(pose) => seen(misread.undone(BodySeen::Pose(pose))?),
+                unknown @ TouchPlace::Unknown(_) => unknown,
             };
         }
         Some((undone, What::Kind(misread.kind())))
@@ -332,18 +332,18 @@ fn read_otherwise(robot: &KnownRobot, touches: &Touches) -> impl Iterator<Item =
     of_readings.chain(of_places)
 }
 
-fn seen(seen: BodySeen) -> Seen {
+fn seen(seen: BodySeen) -> TouchPlace {
     match seen {
-        BodySeen::Point(point) => Seen::Point(point),
-        BodySeen::Pose(pose) => Seen::Pose(pose),
+        BodySeen::Point(point) => TouchPlace::Point(point),
+        BodySeen::Pose(pose) => TouchPlace::Pose(pose),
     }
 }
 
 /// Places of points that are known, each once.
 fn known_places<'a>(touches: impl Iterator<Item = &'a Touch>) -> Vec<Vector3<f64>> {
     each_place(touches.filter_map(|touch| match touch.seen {
-        Seen::Point(place) => Some(place),
-        Seen::Pose(_) | Seen::Unknown(_) => None,
+        TouchPlace::Point(place) => Some(place),
+        TouchPlace::Pose(_) | TouchPlace::Unknown(_) => None,
     }))
 }
 
@@ -352,18 +352,18 @@ fn with_unknown_places(touches: &Touches, of: impl Fn(&Touch) -> bool) -> (Touch
     let mut apart = touches.clone();
     let known = known_places(touches.all.iter().filter(|t| of(t)));
     for touch in apart.all.iter_mut().filter(|t| of(t)) {
-        let Seen::Point(place) = touch.seen else { continue };
+        let TouchPlace::Point(place) = touch.seen else { continue };
         let index = known.iter().position(|p| *p == place).unwrap_or_default();
-        touch.seen = Seen::Unknown(touches.contacts.len() + index);
+        touch.seen = TouchPlace::Unknown(touches.contacts.len() + index);
     }
     apart.contacts.extend(known.iter().map(|_| String::new()));
     (apart, known)
 }
 
 fn of_another_place(touches: &Touches, k: usize) -> Option<(Touches, What)> {
-    let Seen::Point(place) = touches.all[k].seen else { return None };
+    let TouchPlace::Point(place) = touches.all[k].seen else { return None };
     let mut undone = touches.clone();
-    undone.all[k].seen = Seen::Unknown(touches.contacts.len());
+    undone.all[k].seen = TouchPlace::Unknown(touches.contacts.len());
     undone.contacts.push(String::new());
     Some((undone, What::Touch(k, place)))
 }
@@ -407,9 +407,9 @@ fn work_moved(
     let mut undone = touches.clone();
     for touch in undone.all.iter_mut().filter(|t| t.posture >= from) {
         touch.seen = match touch.seen {
-            Seen::Point(place) => Seen::Point(moved.transform(&place)),
-            Seen::Pose(pose) => Seen::Pose(moved * pose),
-            unknown @ Seen::Unknown(_) => unknown,
+            TouchPlace::Point(place) => TouchPlace::Point(moved.transform(&place)),
+            TouchPlace::Pose(pose) => TouchPlace::Pose(moved * pose),
+            unknown @ TouchPlace::Unknown(_) => unknown,
         };
     }
     Some((undone, What::Work { from, moved }))
@@ -441,7 +441,7 @@ fn stop_at(posture: usize, touches: &Touches) -> String {
 fn place_elsewhere(place: &Vector3<f64>, left: &FrameFit, touches: &Touches) -> Words {
     let found = left.places.last().unwrap_or(place);
     let of: BTreeSet<&str> =
-        touches.all.iter().filter(|t| t.seen == Seen::Point(*place)).map(|t| t.stop.as_str()).collect();
+        touches.all.iter().filter(|t| t.seen == TouchPlace::Point(*place)).map(|t| t.stop.as_str()).collect();
     let more = if of.len() > NAMED { ", .." } else { "" };
     let names: Vec<&str> = of.into_iter().take(NAMED).collect();
     let what = format!(

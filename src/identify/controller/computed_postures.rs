@@ -238,7 +238,7 @@ pub(in crate::identify) fn told_by_seen<'a>(
     (series, from): (&'a [MeasuredSeries], Before),
     limits: &Limits,
     hold: impl FnOnce(&mut Adjustment) -> Result<()>,
-) -> (Cow<'a, [MeasuredSeries]>, Option<Told>) {
+) -> (Cow<'a, [MeasuredSeries]>, Option<ChosenPostures>) {
     let found = Compared::with("postures", robot, (series, limits), hold, |compared| {
         let stops = Stops::of(compared, series)?;
         let chosen = stops.chosen(from, limits)?;
@@ -258,12 +258,15 @@ pub(in crate::identify) fn told_by_seen<'a>(
         changed += 1;
     }
     let count = stops.all.iter().filter(|stop| series[stop.rows[0].0].readings_are_computed()).count();
-    (Cow::Owned(told), Some(Told { stops: count, changed, is_open: chosen.is_open, undecided: chosen.undecided }))
+    (
+        Cow::Owned(told),
+        Some(ChosenPostures { stops: count, changed, is_open: chosen.is_open, undecided: chosen.undecided }),
+    )
 }
 
 /// What was told of the postures.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::identify) struct Told {
+pub(in crate::identify) struct ChosenPostures {
     /// Stops whose poses were read.
     pub stops: usize,
     /// Stops that are in another posture now.
@@ -274,7 +277,7 @@ pub(in crate::identify) struct Told {
     pub undecided: usize,
 }
 
-impl Told {
+impl ChosenPostures {
     /// What is to be said where the series were `given` and are `told` now.
     pub fn finding(&self, given: &[MeasuredSeries], told: &[MeasuredSeries]) -> ComputedPostures {
         // Cameras at the same stops say it once.

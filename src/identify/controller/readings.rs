@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::told::{Misplaced, ReadAs, Told};
+use super::told::{Misplaced, PosesFit, ReadAs};
 use crate::error::{Code, Error, Notice, Quantity, Result};
 use crate::geom::Pose;
 use crate::model::inverse::{
@@ -30,7 +30,7 @@ const TRIED: usize = 8;
 /// # Errors
 /// Those of [`Series::readings_for`]; poses that the nominal robot does not reach, or reaches in postures without number.
 pub fn readings_of(series: &Series, chain: &Chain) -> Result<Vec<Option<Vec<f64>>>> {
-    readings_told(series, chain, &Told::Open)
+    readings_told(series, chain, &PosesFit::Open)
 }
 
 /// True for a refusal of poses that the robot does not reach: what was seen at them may tell why.
@@ -49,7 +49,11 @@ pub(in crate::identify) const fn is_unreached(refused: &Error) -> bool {
 ///
 /// # Errors
 /// As of [`readings_of`].
-pub(in crate::identify) fn readings_told(series: &Series, chain: &Chain, told: &Told) -> Result<Vec<Option<Vec<f64>>>> {
+pub(in crate::identify) fn readings_told(
+    series: &Series,
+    chain: &Chain,
+    told: &PosesFit,
+) -> Result<Vec<Option<Vec<f64>>>> {
     let Some(poses) = &series.controller else { return series.readings_for(chain) };
     match chain.pose_coordinates() {
         Some(coordinates) => {
@@ -151,7 +155,7 @@ impl Arm {
         Self { limits: reading_limits(chain), robot: Robot::nominal(chain.clone()) }
     }
 
-    fn postures(&self, series: &Series, poses: &ControllerPoses, told: &Told) -> Result<Vec<Option<Vec<f64>>>> {
+    fn postures(&self, series: &Series, poses: &ControllerPoses, told: &PosesFit) -> Result<Vec<Option<Vec<f64>>>> {
         let mut before: Option<Vec<f64>> = None;
         let mut all = Vec::with_capacity(poses.base_from_flange.len());
         for (row, pose) in poses.base_from_flange.iter().enumerate() {
@@ -175,7 +179,7 @@ impl Arm {
     fn near_stated(
         &self,
         series: &Series,
-        (poses, told): (&ControllerPoses, &Told),
+        (poses, told): (&ControllerPoses, &PosesFit),
         row: usize,
         stated_deg: &[f64],
     ) -> Result<Vec<f64>> {
@@ -222,7 +226,7 @@ impl Arm {
     fn not_as_stated(
         &self,
         series: &Series,
-        (poses, told): (&ControllerPoses, &Told),
+        (poses, told): (&ControllerPoses, &PosesFit),
         row: usize,
         stated: &[f64],
         place: String,
@@ -232,9 +236,9 @@ impl Arm {
         let written = poses.base_from_flange[row];
         let fit = "the robot reaches them, the first with the angles of first_stop_deg";
         let mistake = match *told {
-            Told::Fit(way) => misread(way, poses, of_poses, SEEN_FITS),
-            Told::InNoWay => None,
-            Told::Open => {
+            PosesFit::Fit(way) => misread(way, poses, of_poses, SEEN_FITS),
+            PosesFit::InNoWay => None,
+            PosesFit::Open => {
                 let mut tried = ReadAs::mistaken(poses).into_iter();
                 let found = tried.find_map(|ways| self.nearest_to(stated, (poses, row), ways));
                 found.and_then(|way| misread(way, poses, of_poses, fit))
@@ -251,7 +255,7 @@ impl Arm {
             apart.0.to_degrees()
         );
         let remedy = match told {
-            Told::Fit(_) => {
+            PosesFit::Fit(_) => {
                 "give the joint angles that the controller shows at the first stop, in deg, with zeros and signs as in the URDF; if they are \
                  right, the poses are not those of the flange in the base: a user frame (work object) or a tool was active. Their rotation and \
                  unit are as stated: what was seen at the stops fits them"
@@ -319,14 +323,14 @@ impl Arm {
     }
 
     /// Where a pose is out of reach: the mistake that explains it, if there is one.
-    fn out_of_reach(&self, series: &Series, (poses, told): (&ControllerPoses, &Told), row: usize) -> Error {
+    fn out_of_reach(&self, series: &Series, (poses, told): (&ControllerPoses, &PosesFit), row: usize) -> Error {
         let stop = &series.stops.stops[row];
         let chain = &self.robot.chain;
         let place = format!("{}:{}, stop {}", series.readings_file().display(), stop.line, stop.name());
         let reach = self.reach(&poses.base_from_flange);
         let mistake = match *told {
-            Told::Fit(way) => misread(way, poses, place.clone(), SEEN_FITS),
-            Told::Open if !reach.is_of_most() => self.by_reach(poses, &place),
+            PosesFit::Fit(way) => misread(way, poses, place.clone(), SEEN_FITS),
+            PosesFit::Open if !reach.is_of_most() => self.by_reach(poses, &place),
             _ => None,
         };
         if let Some(mistake) = mistake {
@@ -338,16 +342,16 @@ impl Arm {
             chain.tip,
             chain.base,
             match told {
-                Told::Fit(_) =>
+                PosesFit::Fit(_) =>
                     ". What was seen at the stops fits the poses as they are: they are not inverted, rotation and unit are as stated",
-                Told::InNoWay =>
+                PosesFit::InNoWay =>
                     ". What was seen at the stops does not fit them either, nor inverted, in another unit, convention, column or row",
-                Told::Open => "",
+                PosesFit::Open => "",
             }
         );
         let alone = "or leave out --urdf: then camera and hand-eye transform are fitted to the poses alone";
         let remedy = match told {
-            Told::InNoWay => {
+            PosesFit::InNoWay => {
                 "see that the names of the stops stand in the right rows, that plate and camera did not move, and that [controller] rotation is \
                  that of the controller: it may be of a kind that this program does not know"
                     .to_owned()

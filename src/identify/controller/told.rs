@@ -78,7 +78,7 @@ impl ReadAs {
 
 /// What was seen tells of the poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::identify) enum Told {
+pub(in crate::identify) enum PosesFit {
     /// Nothing: too little was seen.
     Open,
     /// They fit, read so.
@@ -88,12 +88,12 @@ pub(in crate::identify) enum Told {
 }
 
 /// What was seen at the stops of one camera and one target, or of one body.
-enum Seen {
+enum SeenAtStops {
     Images(Vec<(usize, CameraMount, Pose)>),
     Body(Vec<(usize, BodySeen)>),
 }
 
-impl Seen {
+impl SeenAtStops {
     /// By the images, else by what a tracker saw; `None` where there are too few of both.
     fn of(series: &MeasuredSeries, limits: &Limits) -> Option<Self> {
         let enough = |count: usize| count >= limits.hand_eye_images;
@@ -144,12 +144,12 @@ fn images(series: &MeasuredSeries, limits: &Limits) -> Option<Vec<(usize, Camera
 }
 
 /// How the poses fit what was seen in the series, which has no readings yet.
-pub(in crate::identify) fn told(series: &MeasuredSeries, poses: &ControllerPoses, limits: &Limits) -> Told {
-    let Some(seen) = Seen::of(series, limits) else { return Told::Open };
+pub(in crate::identify) fn told(series: &MeasuredSeries, poses: &ControllerPoses, limits: &Limits) -> PosesFit {
+    let Some(seen) = SeenAtStops::of(series, limits) else { return PosesFit::Open };
     let misfit = |way: ReadAs| seen.misfit(&way.of(poses));
     let as_written = misfit(ReadAs::WRITTEN);
     if as_written < limits.suspicious_misfit {
-        return Told::Fit(ReadAs::WRITTEN);
+        return PosesFit::Fit(ReadAs::WRITTEN);
     }
     let explains = |left: f64| left < limits.suspicious_misfit && left < limits.mistake_explains * as_written;
     let best_of = |ways: Vec<ReadAs>| {
@@ -158,5 +158,5 @@ pub(in crate::identify) fn told(series: &MeasuredSeries, poses: &ControllerPoses
     };
     let [mut of_one, of_two] = ReadAs::mistaken(poses);
     of_one.extend(ReadAs::misplaced());
-    [of_one, of_two].into_iter().find_map(best_of).map_or(Told::InNoWay, |(_, way)| Told::Fit(way))
+    [of_one, of_two].into_iter().find_map(best_of).map_or(PosesFit::InNoWay, |(_, way)| PosesFit::Fit(way))
 }

@@ -27,7 +27,7 @@ pub struct MeasuredWithNotices {
     pub notices: Vec<Notice>,
 }
 
-struct Seen {
+struct StopObservations {
     observations: Shared<Vec<Observation>>,
     left_out: Option<ImageRejection>,
     /// What the detector advises where it found no plate.
@@ -80,8 +80,8 @@ fn seen_at(
             let by_name: BTreeMap<&str, &Vec<Observation>> =
                 all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
             let given = |image: &str| match by_name.get(image) {
-                Some(o) => Seen { observations: (*o).clone().into(), left_out: None, remedy: None },
-                None => Seen {
+                Some(o) => StopObservations { observations: (*o).clone().into(), left_out: None, remedy: None },
+                None => StopObservations {
                     observations: Shared::default(),
                     left_out: Some(ImageRejection::NoObservations),
                     remedy: None,
@@ -93,7 +93,7 @@ fn seen_at(
         Source::NoImages => return Err(no_images(series)),
         Source::Cameras(_) => return Err(several_cameras(series)),
     };
-    let said = |s: &Seen| s.left_out.as_ref().map(|why| (why.to_string(), s.remedy.clone()));
+    let said = |s: &StopObservations| s.left_out.as_ref().map(|why| (why.to_string(), s.remedy.clone()));
     let failures: Vec<Option<(String, Option<String>)>> = seen.iter().map(said).collect();
     let stops = series.stops.stops.iter().zip(&seen).zip(&failures);
     require_some(
@@ -107,7 +107,7 @@ fn seen_at(
     let mut stops = Vec::with_capacity(readings.len());
     for (k, ((stop, readings), seen)) in series.stops.stops.iter().zip(readings).zip(seen.drain(..)).enumerate() {
         let placement = placement_of(series, &stop.placement, several);
-        let Seen { observations, left_out, .. } = seen;
+        let StopObservations { observations, left_out, .. } = seen;
         let (image, row) = (stop.image.clone(), series.row(k));
         stops.push(MeasuredStop { row, image, readings, placement, observations, left_out });
     }
@@ -193,7 +193,7 @@ fn placement_of(series: &Series, placement: &str, several: bool) -> String {
 }
 
 /// What all stops show, and the size of the images.
-type SeenStops = (Vec<Seen>, Option<(u32, u32)>);
+type SeenStops = (Vec<StopObservations>, Option<(u32, u32)>);
 
 /// The joint noise is estimated: what a data sheet states says nothing of what the robot model lacks, which is part of it.
 fn unused_repeatability(series: &Series) -> Option<Notice> {
@@ -225,7 +225,7 @@ fn look_through(
         let observations = if turn_open.is_empty() { observations } else { turn_open };
         let remedy = failure.as_ref().map(|error| error.remedy.clone());
         let left_out = failure.map(|error| ImageRejection::Unusable { why: error.code, what: error.what });
-        Seen { observations: observations.into(), left_out, remedy }
+        StopObservations { observations: observations.into(), left_out, remedy }
     };
     Ok((images.into_iter().map(seen).collect(), size))
 }

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, Weight};
 use crate::error::Code;
-use crate::frames::{FrameFit, Seen, Touches};
+use crate::frames::{FrameFit, TouchPlace, Touches};
 use crate::geom::{Pose, adjoint};
 use crate::output::corrections::FileFinding;
 use crate::series::JointsBeside;
@@ -146,7 +146,7 @@ pub fn mirror_image_fits(joints: &[String], subject: &str) -> FileFinding {
 fn places_left_out(fit: &FrameFit, touches: &Touches, subject: &str) -> Vec<FileFinding> {
     let mut places: Vec<(Vector3<f64>, Vec<usize>)> = Vec::new();
     for (k, touch) in touches.all.iter().enumerate() {
-        let Seen::Point(place) = touch.seen else { continue };
+        let TouchPlace::Point(place) = touch.seen else { continue };
         match places.iter_mut().find(|(other, _)| *other == place) {
             Some((_, own)) => own.push(k),
             None => places.push((place, vec![k])),

@@ -127,7 +127,7 @@ pub(super) fn used_since(target: &Path) -> Option<String> {
 /// Pictures of a detection whose record lists nothing but their folder, as the first version did.
 fn pictures(record: &[u8]) -> Vec<String> {
     #[derive(Deserialize)]
-    struct Seen {
+    struct DetectedImages {
         images: Vec<Named>,
     }
     #[derive(Deserialize)]
@@ -135,7 +135,7 @@ fn pictures(record: &[u8]) -> Vec<String> {
         name: String,
     }
     let stem = |i: &Named| i.name.strip_suffix(".png").unwrap_or(&i.name).to_owned();
-    let seen = serde_json::from_slice::<Seen>(record);
+    let seen = serde_json::from_slice::<DetectedImages>(record);
     seen.map_or_else(|_| Vec::new(), |s| s.images.iter().map(|i| format!("{OVERLAY_FOLDER}/{}.png", stem(i))).collect())
 }
 

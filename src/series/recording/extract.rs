@@ -178,7 +178,7 @@ fn require_overlap(scan: &Scan, postures: &[Posture], times: &[i64]) -> Result<(
     Err(or_set_back(Error::new(Code::ClocksApart, place, what, remedy), &scan.notices))
 }
 
-/// Images of the standstills; where it is `open` whether they are late by so many ns, those of both. `sigma_s`: as [`Told::sigma_s`].
+/// Images of the standstills; where it is `open` whether they are late by so many ns, those of both. `sigma_s`: as [`KnownDelay::sigma_s`].
 fn groups(
     scan: &mut Scan,
     postures: &[Posture],

@@ -15,7 +15,7 @@ const NOTABLE_DELAY_S: f64 = 0.05;
 /// How late the images of a recording are.
 pub(super) struct Lateness {
     /// What is known of it.
-    pub told: Told,
+    pub told: KnownDelay,
     /// How much longer images take from stamp to recording than joint readings (median), s.
     pub image_delay_s: f64,
     /// How much that grows from begin to end, s.
@@ -41,10 +41,11 @@ impl Lateness {
             Clock::Log => Guess::of_arrival(image_delay_s),
         };
         let told = match options.image_delay_s {
-            Some(delay_s) => Told::By(delay_s),
+            Some(delay_s) => KnownDelay::By(delay_s),
             None => told_by_motion(scan, image_topic, (postures, times), guess, options)?,
         };
-        let is_open = told == Told::Open && options.clock == Clock::Stamp && image_delay_s.abs() > NOTABLE_DELAY_S;
+        let is_open =
+            told == KnownDelay::Open && options.clock == Clock::Stamp && image_delay_s.abs() > NOTABLE_DELAY_S;
         let growth_s = scan.delay_growth_s(image_topic) - scan.delay_growth_s(&topics[0]);
         Ok(Self { told, image_delay_s, growth_s, is_open })
     }
@@ -52,8 +53,8 @@ impl Lateness {
     /// In the time of the images, the joints were there so much later, ns.
     pub fn later_ns(&self) -> i64 {
         match self.told {
-            Told::By(delay_s) | Told::Found(Delay { delay_s, .. }) => nanoseconds(delay_s),
-            Told::NoDelay | Told::Open => 0,
+            KnownDelay::By(delay_s) | KnownDelay::Found(Delay { delay_s, .. }) => nanoseconds(delay_s),
+            KnownDelay::NoDelay | KnownDelay::Open => 0,
         }
     }
 
@@ -74,14 +75,14 @@ impl Lateness {
             );
             notices.push(Notice::new(Code::ImagesDelayed, recording.display(), what, OTHER_CLOCK));
         }
-        notices.extend((self.told == Told::Open && !self.is_open).then(|| delay::unchecked(recording)));
+        notices.extend((self.told == KnownDelay::Open && !self.is_open).then(|| delay::unchecked(recording)));
         notices
     }
 }
 
 /// What is known of the delay of the images.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Told {
+pub(super) enum KnownDelay {
     /// It is given, s.
     By(f64),
     /// What the images show tells it.
@@ -92,7 +93,7 @@ pub(super) enum Told {
     Open,
 }
 
-impl Told {
+impl KnownDelay {
     pub fn late(self) -> Option<Delay> {
         match self {
             Self::Found(delay) => Some(delay),
@@ -117,9 +118,9 @@ fn told_by_motion(
     (postures, times): (&[Posture], &[i64]),
     guess: Guess,
     options: &RecordingOptions,
-) -> Result<Told> {
+) -> Result<KnownDelay> {
     let still = standstills(postures, options.still_speed, nanoseconds(options.least_still_s));
-    let Some(mut frames) = Frames::about_motions(times, &still, guess) else { return Ok(Told::Open) };
+    let Some(mut frames) = Frames::about_motions(times, &still, guess) else { return Ok(KnownDelay::Open) };
     for file in &scan.files {
         for_each(file, |message| {
             if message.topic == topic {
@@ -130,9 +131,9 @@ fn told_by_motion(
     }
     let pairs = frames.pairs();
     Ok(match delay::measured(&pairs, postures, guess) {
-        Some(delay) if options.motion != Motion::Refuse || delay.is_notable(&pairs) => Told::Found(delay),
-        Some(_) => Told::NoDelay,
-        None => Told::Open,
+        Some(delay) if options.motion != Motion::Refuse || delay.is_notable(&pairs) => KnownDelay::Found(delay),
+        Some(_) => KnownDelay::NoDelay,
+        None => KnownDelay::Open,
     })
 }
 
