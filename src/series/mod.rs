@@ -1,7 +1,7 @@
 //! A measurement series: manifest, joint readings, plate, and images or observations.
 //!
 //! A new format of recordings is one file in `recording/` that makes a stream of messages of it, and its arms in `recording/file.rs` and
-//! `recording/parts.rs`.
+//! `recording/recording_files.rs`.
 
 mod camera_section;
 mod contact_file;

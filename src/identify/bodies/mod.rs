@@ -4,9 +4,9 @@
 //! out; the others each name a mistake. `taken_back` takes back what was left out, where it fits the robot that was found. `touch_mistakes` are those of
 //! touches by which tools and work objects are found.
 
-mod breaks;
 mod misfit;
 mod mistakes;
+mod moved_between;
 pub(super) mod placed;
 mod places_exchanged;
 mod points_start;

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::geom::{Pose, project_to_so3};
-use crate::identify::mistakes::parts::ends_of_parts;
+use crate::identify::mistakes::divided::ends_of_parts;
 use crate::init::translations_by_rotations;
 use crate::linalg::{SymmetricFactor, lower_median};
 use crate::problem::{Adjustment, BodyMeasurement};

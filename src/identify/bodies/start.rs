@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::breaks::name_break;
 use super::misfit::{FEWEST_POSES, usual_misfit};
 use super::mistakes::name_mistake;
+use super::moved_between::name_break;
 use super::placed::{SeenFrom, missed, pairs, placed};
 use super::places_exchanged::name_exchange;
 use super::points_start::{DISAGREES, FEWEST_POINTS, HOLD, Placed, TRIMMINGS, once, posture, tip_at};

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::parts::ends_of_parts;
+use super::divided::ends_of_parts;
 use super::readings::shifted_rows;
 use super::suspects::{Suspects, some_of};
 use crate::assess::best_run;

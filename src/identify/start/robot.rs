@@ -10,7 +10,7 @@ use crate::error::{Code, Error, Quantity, Result};
 use crate::fit::FreePoses;
 use crate::geom::log_so3;
 use crate::identify::bodies::rows_of::rows_of_images;
-use crate::identify::mistakes::breaks::broken;
+use crate::identify::mistakes::part_fits::broken;
 use crate::identify::mistakes::suspects::Suspects;
 use crate::identify::start::zeros::place_zeros;
 use crate::identify::start_verdict::{StartReached, StartVerdict};

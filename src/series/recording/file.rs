@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::kind::{head, not_recording};
 use super::message::{MCAP, Message};
-use super::parts::parts_of;
+use super::recording_files::parts_of;
 #[cfg(feature = "mcap")]
 use super::records;
 use super::sqlite;

@@ -24,8 +24,8 @@ mod motion;
 mod moving;
 mod options;
 mod order;
-mod parts;
 mod pixels;
+mod recording_files;
 #[cfg(feature = "mcap")]
 mod records;
 mod samples;
@@ -43,7 +43,7 @@ pub use extract::{Extracted, extract};
 pub(super) use file::require_recording;
 pub use messages::CameraInfo;
 pub use options::{Clock, Motion, Picking, RecordingOptions};
-pub use parts::is_recording;
-pub(super) use parts::written_in;
+pub use recording_files::is_recording;
+pub(super) use recording_files::written_in;
 #[cfg(feature = "mcap")]
 pub use write::{FramePoses, ImageMarks, MarkKind, MarkLayer, RecordingContent, Written, require_new, write_recording};

@@ -12,7 +12,7 @@ use super::message::Message;
 use super::messages::{self, CameraInfo, JointState};
 use super::options::{Clock, RecordingOptions};
 use super::order::{Written, set_back, twice};
-use super::parts::{Parts, parts_of};
+use super::recording_files::{Parts, parts_of};
 use super::samples::{JointSample, shared};
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::linalg::median_by;

@@ -12,7 +12,7 @@ use crate::assess::Limits;
 use crate::diagnose::Finding;
 use crate::error::{Code, Error, Quantity, Result};
 use crate::geom::{Pose, rigid_fit};
-use crate::identify::mistakes::parts::divided;
+use crate::identify::mistakes::divided::divided;
 use crate::problem::{Adjustment, BodySeen, InstrumentKind, MeasuredSeries, stop_name};
 
 /// Of the rows that others do not fit, one in so many may.

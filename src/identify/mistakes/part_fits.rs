@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::parts::{divided, ends_of_parts};
+use super::divided::{divided, ends_of_parts};
 use super::suspects::Suspects;
 use crate::diagnose::{BodyMoved, Finding, agreement, all_stand_still, stands_still};
 use crate::error::{Code, Error};
