@@ -273,15 +273,14 @@ impl<'a> Work<'a> {
             Approach::From(k) => self.places.get(k).and_then(Clone::clone),
             _ => None,
         };
-        let (programmed_before, corrected_before) = before.unzip();
-        let Meant { kind, readings: programmed, held, known, .. } = meant;
-        let kind = &kind;
+        let (programmed_before, previous) = before.unzip();
+        let Meant { kind, readings: programmed, held, known: posture, .. } = meant;
         let meant = reach(self.models.from, &self.limits, &held, programmed_before.as_deref()).stop(&programmed);
-        let moved = self.frames.as_ref().map_or_else(|| Ok(Moved::none()), |f| f.moved(kind))?;
+        let moved = self.frames.as_ref().map_or_else(|| Ok(Moved::none()), |f| f.moved(&kind))?;
         let taught = self.models.from.base_from_tip_at(&meant);
         let taught = self.models.beyond(0, &programmed, 1.0, taught);
         let wanted = self.models.beyond(1, &programmed, -1.0, moved.applied(&taught));
-        let to = reach(self.models.to, &self.limits, &held, corrected_before.as_deref());
+        let to = reach(self.models.to, &self.limits, &held, previous.as_deref());
         let corrected = self.reached(&to, &wanted, &programmed);
         // The next target is approached from here also when this one stays as it is.
         let stands = corrected.clone().unwrap_or_else(|_| programmed.clone());
@@ -292,46 +291,51 @@ impl<'a> Work<'a> {
         let pose_at = |q: &[f64]| self.models.to.base_from_tip_at(&to.stop(q));
         let at_tool = |flange: Pose| flange * moved.flange_from_tool;
         let (turn_rad, shift_m) = at_tool(pose_at(&programmed)).distance(&at_tool(wanted));
-        let mut written = None;
-        let (edits, read, later) = match kind {
-            TargetKind::Joints(joints) => {
-                let (edits, read) = joints.edits(&corrected, &program.files);
-                (edits, read, None)
-            }
-            TargetKind::Pose(pose) if pose.joint_fields.iter().any(Option::is_some) => {
-                let (edits, read) = write_joints(&pose.joint_fields, &corrected, &program.files);
-                (edits, read, None)
-            }
-            TargetKind::Pose(pose) => match &pose.displaced {
-                None => {
-                    let (edits, base_from_flange) =
-                        pose.edits(&self.models.controller.base_from_tip(&corrected), &program.files);
-                    let codes = self.code_edits(pose, &programmed, &corrected, program);
-                    let read = self.commanded(&base_from_flange, &held, &corrected)?;
-                    written = Some(Written::new(pose, &base_from_flange, codes.clone()));
-                    ([edits, codes].concat(), read, None)
-                }
-                Some(displaced) => {
-                    let (pose, displaced) = (PoseTarget::clone(pose), displaced.clone());
-                    let later =
-                        Later { pose, displaced, held: held.clone(), previous: corrected_before.clone(), wanted };
-                    (Vec::new(), corrected, Some(later))
-                }
-            },
-        };
+        let (edits, read, written) = self.text(&kind, &held, (&programmed, &corrected), program)?;
         let (residual_rad, residual_m) = pose_at(&read).distance(&wanted);
-        let beyond = residual_m > RESIDUAL || residual_rad > RESIDUAL;
-        if beyond {
+        if residual_m > RESIDUAL || residual_rad > RESIDUAL {
             let rest = in_words(residual_m, residual_rad);
             return Err(Why::new(LeftReason::Coarse, format!("the decimals of the text leave {rest}")));
         }
         if let Some(last) = self.written.last_mut() {
             *last = written;
         }
-        let posture = known;
         let correction =
             Correction { programmed, corrected: read, posture, shift_m, turn_rad, residual_m, residual_rad };
+        let later = match kind {
+            TargetKind::Pose(pose) if !pose.has_joint_fields() => {
+                pose.displaced.clone().map(|displaced| Later { pose: *pose, displaced, held, previous, wanted })
+            }
+            _ => None,
+        };
         Ok((correction, edits, later))
+    }
+
+    /// Edits that write corrected readings, the readings that are read of the new text, and what others may start from. A displaced target is
+    /// written later.
+    fn text(
+        &self,
+        kind: &TargetKind,
+        held: &[bool],
+        (programmed, corrected): (&[f64], &[f64]),
+        program: &Program,
+    ) -> Understood<(Vec<Edit>, Vec<f64>, Option<Written>)> {
+        let (edits, read) = match kind {
+            TargetKind::Joints(joints) => joints.edits(corrected, &program.files),
+            TargetKind::Pose(pose) if pose.has_joint_fields() => {
+                write_joints(&pose.joint_fields, corrected, &program.files)
+            }
+            TargetKind::Pose(pose) if pose.displaced.is_some() => (Vec::new(), corrected.to_vec()),
+            TargetKind::Pose(pose) => {
+                let wanted = self.models.controller.base_from_tip(corrected);
+                let (edits, base_from_flange) = pose.edits(&wanted, &program.files);
+                let codes = self.code_edits(pose, programmed, corrected, program);
+                let read = self.commanded(&base_from_flange, held, corrected)?;
+                let written = Written::new(pose, &base_from_flange, codes.clone());
+                return Ok(([edits, codes].concat(), read, Some(written)));
+            }
+        };
+        Ok((edits, read, None))
     }
 
     fn commanded(&self, base_from_flange: &Pose, held: &[bool], near: &[f64]) -> Understood<Vec<f64>> {

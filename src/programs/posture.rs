@@ -249,7 +249,7 @@ impl<'a> Finder<'a> {
 
     /// False where the columns of a table state joints that are far from those that reach the pose of the row.
     fn is_beside(&self, pose: &PoseTarget, stated: &[f64], found: &[f64]) -> bool {
-        let is_stated = pose.joint_fields.iter().any(Option::is_some);
+        let is_stated = pose.has_joint_fields();
         let kinds = &self.robot.chain.reading_kinds;
         let mut angles = stated.iter().zip(found).zip(kinds).filter(|(_, kind)| **kind != JointKind::Prismatic);
         !is_stated || angles.all(|((stated, found), _)| (stated - found).abs() < FARTHEST_STATED_RAD)
@@ -257,7 +257,7 @@ impl<'a> Finder<'a> {
 
     /// The posture that goes on from the target before, or the one next to `--start`.
     fn by_approach(&mut self, pose: &PoseTarget, held: &[bool], before: Before<'_>, way: Way) -> Understood<Posture> {
-        let written = pose.joint_fields.iter().any(Option::is_some);
+        let written = pose.has_joint_fields();
         let choice = if written { Choice::Nearest } else { Choice::Clear };
         match (before.readings, self.start) {
             (Some(q), _) if before.straight && way != Way::Joints => self.by_tool(pose, held, q, way),

@@ -398,6 +398,11 @@ impl PoseTarget {
         }
     }
 
+    /// True where joints are written beside the pose.
+    pub fn has_joint_fields(&self) -> bool {
+        self.joint_fields.iter().any(Option::is_some)
+    }
+
     /// True where the text leaves numbers out.
     pub(super) fn is_partial(&self) -> bool {
         let rotation = match &self.rotation {

@@ -257,8 +257,7 @@ fn robot(args: &CompensateArgs, file: &Path, compensation: Option<&Path>) -> Res
 
 /// Poses are turned into joints by the model of the controller, which must be given for them.
 fn poses_have_model(args: &CompensateArgs, program: &Program) -> Result<()> {
-    let needs_controller =
-        |t: &&Target| matches!(&t.kind, TargetKind::Pose(p) if p.joint_fields.iter().all(Option::is_none));
+    let needs_controller = |t: &&Target| matches!(&t.kind, TargetKind::Pose(p) if !p.has_joint_fields());
     let (None, Some(t)) = (&args.nominal, program.targets.iter().find(needs_controller)) else { return Ok(()) };
     let place = format!("{}:{} {}", program.files[t.file].name, t.line, t.name);
     let what = "is a pose, which the controller turns into joints by its own model";

@@ -121,7 +121,7 @@ pub fn displaced_finding(program: &Program, done: &Compensated) -> Option<FileFi
 pub fn poses_kept_finding(program: &Program, done: &Compensated) -> Option<FileFinding> {
     let is_beside = |(target, outcome): &(&Target, &TargetOutcome)| {
         let is_done = matches!(outcome, TargetOutcome::Done(_));
-        is_done && matches!(&target.kind, TargetKind::Pose(pose) if pose.joint_fields.iter().any(Option::is_some))
+        is_done && matches!(&target.kind, TargetKind::Pose(pose) if pose.has_joint_fields())
     };
     let count = program.targets.iter().zip(&done.outcomes).filter(is_beside).count();
     (count > 0).then(|| FileFinding {
