@@ -13,7 +13,7 @@ use crate::plan::criterion::Criterion;
 use crate::plan::information::{Identified, candidate_information, flange_weight, stop_information};
 use crate::plan::order::{Leg, imbalance, leg_across, tour};
 use crate::plan::refine::{Refined, Refinement};
-use crate::plan::relax::{Design, NoDesign};
+use crate::plan::relax::NoDesign;
 use crate::plan::rounding::round;
 use crate::plan::scene::{Scene, SceneOptions};
 use crate::plan::setting::{PlannedStop, Setting, rough_knowledge};
@@ -127,6 +127,16 @@ fn timed<T>(phase: &str, work: impl FnOnce() -> T) -> T {
     done
 }
 
+/// Joint vectors over which the accuracy of the flange is meant; those of the candidates where there are none.
+fn targets(request: &PlanRequest, scene: &Scene, pool: &[Candidate]) -> Vec<Vec<f64>> {
+    let CandidateOptions { limit_margin, seed, .. } = request.candidates;
+    let targets = match &request.demand {
+        Demand::Targets(list) => list.clone(),
+        _ => workspace(&request.setting, scene, TARGETS, limit_margin, seed),
+    };
+    if targets.is_empty() { pool.iter().map(|c| c.readings.clone()).collect() } else { targets }
+}
+
 /// Chooses poses.
 ///
 /// # Errors
@@ -137,22 +147,15 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
     let (pool, tally) = timed("candidates", || candidates(setting, &scene, &request.candidates))?;
     let adjustment = setting.adjustment();
     let problem = &adjustment.problem;
-    let mut known = rough_knowledge(problem, &setting.camera);
-    let prior: Vec<f64> = known.diagonal().iter().map(|m| 1.0 / m).collect();
-    for stop in &request.taken {
-        if let Some(m) = stop_information(&adjustment, stop) {
-            known += m;
-        }
-    }
-    let margin = request.candidates.limit_margin;
-    let targets = match &request.demand {
-        Demand::Targets(list) => list.clone(),
-        _ => workspace(setting, &scene, TARGETS, margin, request.candidates.seed),
-    };
-    let targets = if targets.is_empty() { pool.iter().map(|c| c.readings.clone()).collect() } else { targets };
+    let rough = rough_knowledge(problem, &setting.camera);
+    let prior: Vec<f64> = rough.diagonal().iter().map(|m| 1.0 / m).collect();
+    let taken = request.taken.iter().filter_map(|stop| stop_information(&adjustment, stop));
+    let known = taken.fold(rough, |known, m| known + m);
+    let targets = targets(request, &scene, &pool);
     let weight = flange_weight(problem, &setting.robot, &targets);
     let criterion = criterion(&request.demand, &problem.layout, &weight)?;
-    let (drawn, count) = (pool.len(), request.count);
+    let drawn = pool.len();
+    let refused = |reason| no_plan(reason, request, drawn);
     let (identified, known, information) = timed("information", || {
         let whole: Vec<DMatrix<f64>> =
             pool.par_iter().map(|c| candidate_information(&adjustment, setting, c)).collect();
@@ -168,18 +171,15 @@ pub fn choose(request: &PlanRequest) -> Result<Choice> {
         rows: &|pool| rows(&request.budget, pool, drawn, setting.placements.len()),
         known: &known,
         criterion: &criterion,
-        count,
+        count: request.count,
         rounds: request.rounds,
     };
-    let mut refined = timed("weights and further candidates", || refinement.refine(pool, information, tally))
-        .map_err(|reason| no_plan(reason, request, drawn))?;
-    let rounded = timed("whole images", || {
-        let Refined { information, rows, relaxed, .. } = &refined;
-        round(&Design { known: &known, candidates: information, criterion: &criterion, count, rows }, relaxed)
-    });
-    let mut rounded = rounded.ok_or_else(|| no_plan(NoDesign::Contradiction, request, drawn))?;
-    timed("whole images made better", || refinement.polish(&mut refined, &mut rounded))
-        .map_err(|reason| no_plan(reason, request, drawn))?;
+    let refined = timed("weights and further candidates", || refinement.refine(pool, information, tally));
+    let mut refined = refined.map_err(refused)?;
+    let rounded =
+        timed("whole images", || round(&refinement.design(&refined.information, &refined.rows), &refined.relaxed));
+    let mut rounded = rounded.ok_or_else(|| refused(NoDesign::Contradiction))?;
+    timed("whole images made better", || refinement.polish(&mut refined, &mut rounded)).map_err(refused)?;
     let Refined { pool, information, relaxed, tally, values, .. } = refined;
     Ok(Choice {
         drawn,

@@ -109,7 +109,8 @@ struct Priced {
 }
 
 impl Refinement<'_> {
-    fn design<'d>(&'d self, information: &'d [DMatrix<f64>], rows: &'d [LinearRow]) -> Design<'d> {
+    /// The choice among candidates with this information, under these rows.
+    pub fn design<'d>(&'d self, information: &'d [DMatrix<f64>], rows: &'d [LinearRow]) -> Design<'d> {
         Design { known: self.known, candidates: information, criterion: self.criterion, count: self.count, rows }
     }
 
