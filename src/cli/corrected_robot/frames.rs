@@ -12,7 +12,7 @@ use crate::cli::Verdict;
 use crate::cli::flags::pose_argument::pose;
 use crate::cli::results::show::read_solution;
 use crate::cli::terminal::say::{self, say, say_line};
-use crate::diagnose::{Mistake, Weight};
+use crate::diagnose::Weight;
 use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, TouchPlace, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
@@ -100,23 +100,15 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
         fitted.tools[0].rotation = orientation(args)?;
     }
     let subject = args.touches.first().unwrap_or(&args.from).display().to_string();
-    let mistake = touch_mistake(&robot, &touches, &given, (&fitted, &found.limits));
-    let is_explained = mistake.is_some();
-    let mut findings = findings((&fitted, mistake), &touches, (&found.limits, placement), &subject);
-    findings.extend(computed((&fitted, is_explained), &as_planned, &found.limits, &subject));
-    findings.extend(other_frame(&record.robot.base, (&fitted, &work_name(&touches)), &found.limits, &subject));
-    findings.extend(
-        zeros.as_ref().and_then(|z| other_zeros((&fitted, z), (&robot, &touches, &given), &found.limits, &subject)),
-    );
-    let mirrored = mirror_image(&robot, &touches, &given, (&fitted, &found.limits));
-    findings.extend(mirrored.map(|joints| mirror_image_fits(&joints, &subject)));
-    findings.extend(from_below(robot.exported(), (&fitted, &touches), &found.limits, &subject));
+    let (limits, subject) = (&found.limits, subject.as_str());
+    let judged = FittedFrames { robot: &robot, touches: &touches, given: &given, fit: &fitted, limits, subject };
+    let mut findings = judged.findings(&record.robot.base, placement, &as_planned, zeros.as_ref());
     let frames = written(args, &record, &description, &fitted, &touches, tool_told)?;
     let poses = (Weight::Note, "robotcal_frames.script has the plane");
     let of_base = [record.robot.base.as_str(), record.robot.tip.as_str()];
     let in_own = args.base.is_none() && frames.work.is_some();
     findings.extend(in_own.then(|| controller_base(&description, of_base, poses)).flatten());
-    let is_carried = carried(robot.exported(), frames.work.as_ref().map(|w| w.name.as_str()), &subject);
+    let is_carried = carried(robot.exported(), frames.work.as_ref().map(|w| w.name.as_str()), subject);
     let work = frames.work.clone().filter(|_| is_carried.is_none());
     let of_controller = Frames { work, ..frames.clone() };
     findings.extend(is_carried);
@@ -160,88 +152,100 @@ fn say_moved(moved: &[f64], touches: usize) {
     }
 }
 
-/// What is to be said of the fit. The plate of a solution counts by where it brings the tool: in the base it stands as uncertainly as the base
-/// itself, which no target sees.
-fn findings(
-    (fit, mistake): (&FrameFit, Option<Mistake>),
-    touches: &Touches,
-    (limits, placement): (&Limits, Option<usize>),
-    subject: &str,
-) -> Vec<FileFinding> {
-    let is_explained = mistake.is_some();
-    let work_covariance = if placement.is_some() { None } else { fit.work_covariance.clone() };
-    let by_use = FrameFit { work_covariance, ..fit.clone() };
-    let mut all = frame_findings((&by_use, mistake), touches, limits, subject);
-    if !is_explained {
-        all.extend(placement.and_then(|_| plate_weak(fit, touches, limits, subject)));
-    }
-    all
-}
-
-/// The touches contradict the solution as their readings are taken, and do not the other way.
-fn other_zeros(
-    (fit, zeros): (&FrameFit, &Zeros),
-    (robot, touches, given): (&KnownRobot, &Touches, &Given),
-    limits: &Limits,
-    subject: &str,
-) -> Option<FileFinding> {
-    let mut otherwise = touches.clone();
-    otherwise.add(&zeros.instead());
-    let factor = fit.contradiction(limits);
-    let other = frames::fit(robot, &otherwise, given, limits).ok()?;
-    let (other_factor, word) = (other.contradiction(limits), zeros.other());
-    let text = format!(
-        "the touches contradict the solution {factor:.1} times as far as they may with their readings as taken, and {other_factor:.1} times as those of the controller {word} the offsets of mastering.csv were entered: say --readings {word}"
-    );
-    let quantities = [("factor", factor), ("other_factor", other_factor)];
-    let is_other = factor > limits.touch_factor && other_factor <= limits.touch_factor;
-    is_other.then(|| FileFinding::new(Code::ReadingsOfOtherZeros, Weight::Gate, subject, quantities, text))
-}
-
-/// The tool is hardly known relative to the plate.
-fn plate_weak(fit: &FrameFit, touches: &Touches, limits: &Limits, subject: &str) -> Option<FileFinding> {
-    let sigma_mm = 1e3 * fit.expected.with_frames_m;
-    let text = format!(
-        "the tool relative to the plate is hardly told: {sigma_mm:.1} mm RMS expected over the stops of the solution and the touches; touch with the tip turned further, and markers further apart"
-    );
-    let is_weak = !touches.all.is_empty() && sigma_mm > limits.frame_sigma_mm;
-    is_weak.then(|| FileFinding::new(Code::FrameWeak, Weight::Gate, subject, [("sigma_mm", sigma_mm)], text))
-}
-
 /// Stops that are named.
 const MOST_STOPS: usize = 5;
 
-/// Touches that nobody made: with the joint values of a plan, or as exact as only computed ones are.
-fn computed(
-    (fit, is_explained): (&FrameFit, bool),
-    as_planned: &[String],
-    limits: &Limits,
-    subject: &str,
-) -> Option<FileFinding> {
-    let AsStated { size, freedom } = fit.as_stated;
-    let is_exact = !is_explained && freedom >= limits.exact_touches_freedom && size < limits.exact_touches;
-    let what = if as_planned.is_empty() {
-        format!(
-            "the touches fit {:.0} times better than their stated sigma and the joint noise let them ({:.4} mm RMS, {freedom} degrees of freedom): these are the joint values of a plan, or computed ones, not those at which the tool touched; write these into joints.csv (or correct sigma_m, if it is so much too large)",
-            1.0 / size.max(f64::MIN_POSITIVE),
-            1e3 * fit.rms_m
-        )
-    } else {
-        format!(
-            "{} of the stops have the joint values of plan.json to the last digit ({}{}): nobody jogged there; write those at which the tool touched into joints.csv, or take these rows out",
-            as_planned.len(),
-            as_planned.iter().take(MOST_STOPS).cloned().collect::<Vec<_>>().join(", "),
-            if as_planned.len() > MOST_STOPS { ", .." } else { "" }
-        )
-    };
-    let quantities = [
-        ("size", size),
-        ("freedom", freedom as f64),
-        ("rms_mm", 1e3 * fit.rms_m),
-        ("as_planned", as_planned.len() as f64),
-    ];
-    (is_exact || !as_planned.is_empty())
-        .then(|| FileFinding::new(Code::TouchesExact, Weight::Gate, subject, quantities, what))
+/// Frames that were fitted to touches, with what they are judged by.
+struct FittedFrames<'a> {
+    robot: &'a KnownRobot,
+    touches: &'a Touches,
+    given: &'a Given,
+    fit: &'a FrameFit,
+    limits: &'a Limits,
+    /// What the findings are about.
+    subject: &'a str,
+}
+
+impl FittedFrames<'_> {
+    /// What is to be said of the fit.
+    fn findings(
+        &self,
+        base: &str,
+        placement: Option<usize>,
+        as_planned: &[String],
+        zeros: Option<&Zeros>,
+    ) -> Vec<FileFinding> {
+        let Self { robot, touches, given, fit, limits, subject } = *self;
+        let mistake = touch_mistake(robot, touches, given, (fit, limits));
+        let is_explained = mistake.is_some();
+        // The plate of a solution counts by where it brings the tool: in the base it stands as uncertainly as the base itself, which no target sees.
+        let work_covariance = if placement.is_some() { None } else { fit.work_covariance.clone() };
+        let by_use = FrameFit { work_covariance, ..fit.clone() };
+        let mut all = frame_findings((&by_use, mistake), touches, limits, subject);
+        all.extend(placement.filter(|_| !is_explained).and_then(|_| self.plate_weak()));
+        all.extend(self.computed(is_explained, as_planned));
+        all.extend(other_frame(base, (fit, &work_name(touches)), limits, subject));
+        all.extend(zeros.and_then(|zeros| self.other_zeros(zeros)));
+        let mirrored = mirror_image(robot, touches, given, (fit, limits));
+        all.extend(mirrored.map(|joints| mirror_image_fits(&joints, subject)));
+        all.extend(from_below(robot.exported(), (fit, touches), limits, subject));
+        all
+    }
+
+    /// The touches contradict the solution as their readings are taken, and do not the other way.
+    fn other_zeros(&self, zeros: &Zeros) -> Option<FileFinding> {
+        let Self { robot, touches, given, fit, limits, subject } = *self;
+        let mut otherwise = touches.clone();
+        otherwise.add(&zeros.instead());
+        let factor = fit.contradiction(limits);
+        let other = frames::fit(robot, &otherwise, given, limits).ok()?;
+        let (other_factor, word) = (other.contradiction(limits), zeros.other());
+        let text = format!(
+            "the touches contradict the solution {factor:.1} times as far as they may with their readings as taken, and {other_factor:.1} times as those of the controller {word} the offsets of mastering.csv were entered: say --readings {word}"
+        );
+        let quantities = [("factor", factor), ("other_factor", other_factor)];
+        let is_other = factor > limits.touch_factor && other_factor <= limits.touch_factor;
+        is_other.then(|| FileFinding::new(Code::ReadingsOfOtherZeros, Weight::Gate, subject, quantities, text))
+    }
+
+    /// The tool is hardly known relative to the plate.
+    fn plate_weak(&self) -> Option<FileFinding> {
+        let sigma_mm = 1e3 * self.fit.expected.with_frames_m;
+        let text = format!(
+            "the tool relative to the plate is hardly told: {sigma_mm:.1} mm RMS expected over the stops of the solution and the touches; touch with the tip turned further, and markers further apart"
+        );
+        let is_weak = !self.touches.all.is_empty() && sigma_mm > self.limits.frame_sigma_mm;
+        is_weak.then(|| FileFinding::new(Code::FrameWeak, Weight::Gate, self.subject, [("sigma_mm", sigma_mm)], text))
+    }
+
+    /// Touches that nobody made: with the joint values of a plan, or as exact as only computed ones are.
+    fn computed(&self, is_explained: bool, as_planned: &[String]) -> Option<FileFinding> {
+        let Self { fit, limits, subject, .. } = *self;
+        let AsStated { size, freedom } = fit.as_stated;
+        let is_exact = !is_explained && freedom >= limits.exact_touches_freedom && size < limits.exact_touches;
+        let what = if as_planned.is_empty() {
+            format!(
+                "the touches fit {:.0} times better than their stated sigma and the joint noise let them ({:.4} mm RMS, {freedom} degrees of freedom): these are the joint values of a plan, or computed ones, not those at which the tool touched; write these into joints.csv (or correct sigma_m, if it is so much too large)",
+                1.0 / size.max(f64::MIN_POSITIVE),
+                1e3 * fit.rms_m
+            )
+        } else {
+            format!(
+                "{} of the stops have the joint values of plan.json to the last digit ({}{}): nobody jogged there; write those at which the tool touched into joints.csv, or take these rows out",
+                as_planned.len(),
+                as_planned.iter().take(MOST_STOPS).cloned().collect::<Vec<_>>().join(", "),
+                if as_planned.len() > MOST_STOPS { ", .." } else { "" }
+            )
+        };
+        let quantities = [
+            ("size", size),
+            ("freedom", freedom as f64),
+            ("rms_mm", 1e3 * fit.rms_m),
+            ("as_planned", as_planned.len() as f64),
+        ];
+        (is_exact || !as_planned.is_empty())
+            .then(|| FileFinding::new(Code::TouchesExact, Weight::Gate, subject, quantities, what))
+    }
 }
 
 /// The failure of the fit with the folders of the touches that it is about.
