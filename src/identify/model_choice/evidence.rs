@@ -1,4 +1,5 @@
-//! Which robot model the data support: Laplace's approximation of the evidence, each at the joint noise that it leaves.
+//! Which robot model the data support: Laplace's approximation of the evidence, at the joint noise of the full model; where that leaves none, each at its
+//! own.
 //!
 //! `ln E = -cost - 1/2 ln det N - sum ln sigma_prior` up to what the models share, with the whole information `N` (dense columns,
 //! latents and markers) at the optimum of each (D. MacKay, *Bayesian interpolation*, 1992).
@@ -40,7 +41,7 @@ pub(in crate::identify) fn best_model(
 ) -> Result<(JointFit, Vec<Evidence>)> {
     let (compared, without) = {
         let _stage = stage("evidence of robot models");
-        compare_models(&full.fit, options.joint_noise == JointNoise::Estimated)
+        compare_models(&full.fit, options.joint_noise)
     };
     notices.extend(without.iter().map(|(model, why)| not_compared(*model, *why)));
     let (evidences, mut reduced): (Vec<Evidence>, Vec<Adjustment>) = compared.into_iter().unzip();
@@ -80,10 +81,10 @@ fn not_compared(model: RobotModel, why: NoEvidence) -> Notice {
 /// What is known of every model that a fit of the full one holds: its evidence, and its optimum; and models that have none.
 type Compared = (Vec<(Evidence, Adjustment)>, Vec<(RobotModel, NoEvidence)>);
 
-/// Compares them: smaller ones with their own joint noise, where it is `estimated`.
-fn compare_models(full: &Fit, estimated: bool) -> Compared {
+/// Compares them.
+fn compare_models(full: &Fit, noise: JointNoise) -> Compared {
     let models = RobotModel::CHOICES;
-    let found = side_by_side(&full.problem, &models, |_, model| evidence(full, *model, estimated));
+    let found = side_by_side(&full.problem, &models, |_, model| evidence(full, *model, noise));
     let (mut all, mut without) = (Vec::new(), Vec::new());
     for (model, found) in models.into_iter().zip(found) {
         match found {
@@ -96,7 +97,11 @@ fn compare_models(full: &Fit, estimated: bool) -> Compared {
     (all, without)
 }
 
-fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> std::result::Result<(Evidence, Adjustment), NoEvidence> {
+fn evidence(
+    full: &Fit,
+    model: RobotModel,
+    noise: JointNoise,
+) -> std::result::Result<(Evidence, Adjustment), NoEvidence> {
     let dropped = dropped_terms(full, model);
     let whole = if dropped.is_empty() { full.adjustment.clone() } else { without_terms(full, &dropped) };
     let some = whole.some_stops(MANY_STOPS, SOME_STOPS);
@@ -104,12 +109,13 @@ fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> std::result::Resu
         let log_evidence = log_evidence_of_fit(full).ok_or(NoEvidence::Undetermined)?;
         return Ok((told(full.linear(), model, log_evidence), whole));
     }
-    let mut smaller = some.unwrap_or(whole);
+    let mut start = some.unwrap_or(whole);
     let settings = Settings { decrement: DECREMENT, ..Settings::default() };
-    let outcome = match estimated && full.problem.noise.joint.iter().flatten().all(|s| *s <= JOINT_NOISE_FLOOR) {
-        // Terms enough to take up all noise would leave a smaller model none, and judge it by errors that it does not have.
+    let has_none = full.problem.noise.joint.iter().flatten().all(|s| *s <= JOINT_NOISE_FLOOR);
+    let outcome = match noise == JointNoise::Estimated && has_none {
+        // Terms enough to take up all noise would leave a model with fewer of them none, and judge it by errors that it does not have.
         true => {
-            smaller.problem.noise.joint.iter_mut().flatten().for_each(|s| *s = FIRST_JOINT_NOISE);
+            start.problem.noise.joint.iter_mut().flatten().for_each(|s| *s = FIRST_JOINT_NOISE);
             let options = ComponentOptions {
                 factors: false,
                 displacement: false,
@@ -117,9 +123,9 @@ fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> std::result::Resu
                 settings,
                 ..ComponentOptions::default()
             };
-            estimate_components(smaller, &options)
+            estimate_components(start, &options)
         }
-        false => solve(smaller, &settings),
+        false => solve(start, &settings),
     };
     let log_evidence = log_evidence_of_outcome(&outcome)?;
     let linear = outcome.linear().ok_or(NoEvidence::Unfinished(outcome.status))?;
@@ -127,7 +133,7 @@ fn evidence(full: &Fit, model: RobotModel, estimated: bool) -> std::result::Resu
     Ok((evidence, outcome.adjustment))
 }
 
-/// Terms of the robot that a smaller model does not have.
+/// Terms of the robot that a model does not have.
 fn dropped_terms(full: &Adjustment, model: RobotModel) -> Vec<usize> {
     let robot = &full.state.robot;
     let is_dropped = |t: &JointTerm| !model.has(t.term, &robot.chain, t.reading);
@@ -145,19 +151,19 @@ fn without_terms(full: &Fit, dropped: &[usize]) -> Adjustment {
         columns.iter().map(|c| layout.columns[*c].prior_mean - full.state.robot.terms[c - first].value),
     );
     let of_columns = covariance.reduced.select_columns(&columns);
-    let mut smaller = full.adjustment.clone();
+    let mut left = full.adjustment.clone();
     if let Ok(factor) = SymmetricFactor::new(&of_columns.select_rows(&columns)) {
         let step = covariance.system.step(full.linear(), &(of_columns * factor.solve(&by_condition)));
-        smaller.state = full.state.moved(layout, &step);
+        left.state = full.state.moved(layout, &step);
     }
-    let Adjustment { problem, state } = &mut smaller;
+    let Adjustment { problem, state } = &mut left;
     for k in dropped {
         let column = &mut problem.layout.columns[first + k];
         // A fixed term stays at its prior mean, where its prior costs nothing.
         state.robot.terms[*k].value = column.prior_mean;
         column.free = false;
     }
-    smaller
+    left
 }
 
 /// Of the model that an adjustment has, at its optimum.
@@ -171,9 +177,9 @@ fn told(linear: LinearProblem, model: RobotModel, log_evidence: f64) -> Evidence
 mod tests {
     use super::*;
 
-    /// Where the full model has no evidence, that of a smaller one beats nothing.
+    /// Where the full model has no evidence, none takes its place.
     #[test]
-    fn a_smaller_model_takes_the_place_of_one_that_it_was_compared_with() {
+    fn a_model_with_fewer_terms_takes_the_place_of_one_that_it_was_compared_with() {
         let of = |model, log_evidence, parameters| Evidence { model, log_evidence, cost: 1.0, parameters };
         let [rigid, gear] = [of(RobotModel::Rigid, 0.0, 48), of(RobotModel::Gear, -1.0, 78)];
         let largest = |full| {
