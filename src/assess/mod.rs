@@ -50,7 +50,7 @@ pub use limits::Limits;
 pub use near_nominal::{extrapolation_m, restraint};
 pub use pattern_effect::PatternEffect;
 pub use patterns::{Bearer, Pattern, PatternTest, camera_shows_pattern, cause, patterns};
-pub use points::{ExpectedRms, ExpectedSquares, MeasuredPoint, PointFit, fit_points, freedom};
+pub use points::{Derivatives, ExpectedRms, ExpectedSquares, MeasuredPoint, PointFit, fit_points, freedom};
 pub use points_apart::{DeviceMoved, MARKERS_DRAWN_ALONG, OddPoints, StepCause, device_moved, farthest, odd_points};
 pub use points_mistaken::{ReadingMistake, reading_mistake};
 pub use points_tell::LeftOpen;

@@ -6,7 +6,6 @@ use super::flange::everywhere;
 use super::mean_square::MeanSquare;
 use crate::geom::{Pose, rigid_fit, skew};
 use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
-use crate::model::joint_terms::LOCAL_RANGE;
 use crate::model::robot::{Posture, Robot};
 use crate::solve::Spread;
 
@@ -183,19 +182,13 @@ pub struct ExpectedSquares {
 }
 
 /// Derivatives of points, three rows each, in the frame of the device.
-pub(super) struct Derivatives {
+pub struct Derivatives {
     /// By the robot's columns.
     pub by_model: DMatrix<f64>,
     /// By the noise of every reading of the point itself, in its sigmas.
     pub by_noise: DMatrix<f64>,
     /// By frame and reflector.
     pub fitted: DMatrix<f64>,
-}
-
-/// Every two points, with every reading.
-fn pairs(points: usize, readings: usize) -> impl Iterator<Item = (usize, usize, usize)> {
-    let all = (0..points).flat_map(move |a| (0..points).map(move |b| (a, b)));
-    all.flat_map(move |(a, b)| (0..readings).map(move |r| (a, b, r)))
 }
 
 impl PointFit {
@@ -274,44 +267,14 @@ impl PointFit {
         Some(fit_points(other, &points.iter().map(by_robot).collect::<Vec<_>>())?.residuals_m)
     }
 
-    /// Logarithm of the density of the points under what is stated, frame and reflector unknown (restricted likelihood: of the contrasts
-    /// that frame and reflector leave). A model that is right within its sigmas has a larger one than a model that is as right, or
-    /// righter, and promises more than it holds.
-    ///
-    /// `covariance` and `own` as for [`PointFit::expected`], `local` the local errors of the readings (common to points at the same
-    /// reading), `device_m` the error of the device per axis.
-    pub fn log_density(
+    /// Those of points.
+    pub fn derivatives(
         &self,
         robot: &Robot,
         points: &[MeasuredPoint],
-        covariance: &DMatrix<f64>,
-        [own, local]: [&[f64]; 2],
-        device_m: f64,
-    ) -> Option<f64> {
-        let d = self.derivatives(robot, points, covariance.nrows(), &vec![1.0; own.len()]);
-        let (rows, readings) = (3 * points.len(), own.len());
-        let mut all = product(&product(&d.by_model, covariance), &d.by_model.transpose());
-        for (a, b, r) in pairs(points.len(), readings) {
-            let apart = (points[a].readings[r] - points[b].readings[r]) / LOCAL_RANGE;
-            let variance = f64::from(a == b) * own[r].powi(2) + local[r].powi(2) * (-0.5 * apart * apart).exp();
-            let by = |k: usize| d.by_noise.fixed_view::<3, 1>(3 * k, r);
-            let mut block = all.fixed_view_mut::<3, 3>(3 * a, 3 * b);
-            block += variance * by(a) * by(b).transpose();
-        }
-        (0..rows).for_each(|k| all[(k, k)] += device_m * device_m);
-        let factor = SymmetricFactor::new(&all).ok()?;
-        let weighted = factor.solve_many(&d.fitted);
-        let normal = SymmetricFactor::new(&d.fitted.tr_mul(&weighted)).ok()?;
-        let plain = SymmetricFactor::new(&d.fitted.tr_mul(&d.fitted)).ok()?;
-        let residuals = DVector::from_iterator(rows, self.residuals_m.iter().flat_map(|r| r.iter().copied()));
-        let pull = weighted.tr_mul(&residuals);
-        let square = residuals.dot(&factor.solve(&residuals)) - pull.dot(&normal.solve(&pull));
-        let determinants = factor.log_determinant() + normal.log_determinant() - plain.log_determinant();
-        let contrasts = (rows - d.fitted.ncols()) as f64;
-        Some(-0.5 * (contrasts * std::f64::consts::TAU.ln() + determinants + square))
-    }
-
-    fn derivatives(&self, robot: &Robot, points: &[MeasuredPoint], columns: usize, joint_sigma: &[f64]) -> Derivatives {
+        columns: usize,
+        joint_sigma: &[f64],
+    ) -> Derivatives {
         let (n, readings) = (points.len(), joint_sigma.len());
         let mut by_model = DMatrix::zeros(3 * n, columns);
         let mut by_noise = DMatrix::zeros(3 * n, readings);

@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use crate::robots::shared;
-use nalgebra::Vector3;
-use robotcal::assess::{Limits, MeasuredPoint, fit_points, folds, predict_image, refitted};
+use nalgebra::{DMatrix, DVector, Vector3};
+use robotcal::assess::{Limits, MeasuredPoint, PointFit, fit_points, folds, predict_image, refitted};
 use robotcal::identify::{Estimator, JointNoise, Options, PoseStage, Solution, fit_poses, identify, measure};
+use robotcal::linalg::{SymmetricFactor, product};
 use robotcal::model::camera::Lens;
-use robotcal::model::joint_terms::Term;
+use robotcal::model::joint_terms::{LOCAL_RANGE, Term};
 use robotcal::model::robot::Robot;
 use robotcal::problem::{Adjustment, FamilyKind, LensChoice, MeasuredSeries, State};
 use robotcal::solve::{ComponentOptions, estimate_components};
@@ -24,6 +25,41 @@ fn tracker_points(path: &Path) -> Vec<MeasuredPoint> {
     };
     let point = |v: Vec<f64>| MeasuredPoint { position_m: Vector3::new(v[0], v[1], v[2]), readings: v[3..].to_vec() };
     reader.records().map(|r| point(row(r))).collect()
+}
+
+/// Logarithm of the density of the points of a fit under what is stated, frame and reflector unknown (restricted likelihood: of the contrasts that frame
+/// and reflector leave). A model that is right within its sigmas has a larger one than a model that is as right, or righter, and promises more than it
+/// holds.
+///
+/// `covariance` and `own` as for [`PointFit::expected`], `local` the local errors of the readings (common to points at the same reading).
+fn log_density(
+    fit: &PointFit,
+    (robot, points): (&Robot, &[MeasuredPoint]),
+    covariance: &DMatrix<f64>,
+    [own, local]: [&[f64]; 2],
+) -> Option<f64> {
+    let d = fit.derivatives(robot, points, covariance.nrows(), &vec![1.0; own.len()]);
+    let (rows, readings) = (3 * points.len(), own.len());
+    let mut all = product(&product(&d.by_model, covariance), &d.by_model.transpose());
+    let pairs = (0..points.len()).flat_map(|a| (0..points.len()).map(move |b| (a, b)));
+    for (a, b, r) in pairs.flat_map(|(a, b)| (0..readings).map(move |r| (a, b, r))) {
+        let apart = (points[a].readings[r] - points[b].readings[r]) / LOCAL_RANGE;
+        let variance = f64::from(a == b) * own[r].powi(2) + local[r].powi(2) * (-0.5 * apart * apart).exp();
+        let by = |k: usize| d.by_noise.fixed_view::<3, 1>(3 * k, r);
+        let mut block = all.fixed_view_mut::<3, 3>(3 * a, 3 * b);
+        block += variance * by(a) * by(b).transpose();
+    }
+    (0..rows).for_each(|k| all[(k, k)] += DEVICE_M * DEVICE_M);
+    let factor = SymmetricFactor::new(&all).ok()?;
+    let weighted = factor.solve_many(&d.fitted);
+    let normal = SymmetricFactor::new(&d.fitted.tr_mul(&weighted)).ok()?;
+    let plain = SymmetricFactor::new(&d.fitted.tr_mul(&d.fitted)).ok()?;
+    let residuals = DVector::from_iterator(rows, fit.residuals_m.iter().flat_map(|r| r.iter().copied()));
+    let pull = weighted.tr_mul(&residuals);
+    let square = residuals.dot(&factor.solve(&residuals)) - pull.dot(&normal.solve(&pull));
+    let determinants = factor.log_determinant() + normal.log_determinant() - plain.log_determinant();
+    let contrasts = (rows - d.fitted.ncols()) as f64;
+    Some(-0.5 * (contrasts * std::f64::consts::TAU.ln() + determinants + square))
 }
 
 /// What a solution states, judged by tracker points.
@@ -47,7 +83,7 @@ fn judged(s: &Solution, points: &[MeasuredPoint]) -> Judged {
     let none = vec![0.0; own.len()];
     let local = if local.is_empty() { &none } else { local };
     let together = s.fit.problem.joint_sigma(0);
-    let density = |noise: [&[f64]; 2]| fit.log_density(&robot, points, &covariance, noise, DEVICE_M).unwrap();
+    let density = |noise: [&[f64]; 2]| log_density(&fit, (&robot, points), &covariance, noise).unwrap();
     let sized = |share: f64| together.iter().map(|s| s * share).collect::<Vec<f64>>();
     let noises = [0.25, 0.5, 1.0, 2.0].map(|a| [0.0, 0.25, 0.5, 1.0, 2.0].map(|b| density([&sized(a), &sized(b)])));
     Judged {
