@@ -32,6 +32,7 @@ mod marker_off;
 mod measurement_scatter;
 mod mirror_image;
 mod mistake;
+mod mistake_words;
 mod no_gain;
 mod noticed;
 mod odd_image;
