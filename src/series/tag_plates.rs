@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::plate::{Marker, Plate};
+use super::plate::{Aruco, Marker, Plate};
 use super::plate_kind::PlateKind;
 use super::tags::{Region, TagPrint, Tags, square};
 use crate::error::{Code, Error, Result};
@@ -40,23 +40,16 @@ pub fn regions(plate: &Plate) -> Result<Vec<Region>> {
     }
     match (&plate.tags, &plate.aruco) {
         (Some(tags), _) => tags.regions(plate.columns, plate.rows),
-        (None, Some(aruco)) => {
-            let tags = Tags {
-                dictionary: aruco.dictionary.clone(),
-                print: TagPrint::Opencv,
-                side_m: aruco.side_m,
-                gap_m: 0.0,
-                first_id: aruco.first_id,
-            };
-            charuco(plate, &tags, aruco.legacy)
-        }
+        (None, Some(aruco)) => charuco(plate, aruco),
         (None, None) => Ok(Vec::new()),
     }
 }
 
 /// Squares around the inner corners, the one at the top-left dark (light in a legacy board with an even number of rows), with tags in
 /// the light ones that count up row by row.
-fn charuco(plate: &Plate, tags: &Tags, legacy: bool) -> Result<Vec<Region>> {
+fn charuco(plate: &Plate, aruco: &Aruco) -> Result<Vec<Region>> {
+    let Aruco { dictionary, side_m, first_id, legacy } = aruco.clone();
+    let tags = Tags { dictionary, print: TagPrint::Opencv, side_m, gap_m: 0.0, first_id };
     let (columns, rows) = (plate.columns + 1, plate.rows + 1);
     let dictionary = tags.dictionary("plate.toml", columns * rows / 2)?;
     let first_dark = u32::from(legacy && rows.is_multiple_of(2));

@@ -84,6 +84,11 @@ fn has_moves(file: &TextFile) -> bool {
     !file.name.to_ascii_lowercase().ends_with(".dat")
 }
 
+/// True for data lists other than the configuration of the controller.
+fn declares_targets(file: &TextFile) -> bool {
+    !has_moves(file) && !file.name.to_ascii_lowercase().ends_with("$config.dat")
+}
+
 /// Routines of all files.
 fn routines(files: &[TextFile]) -> Result<Routines> {
     let mut all = Routines::default();
@@ -142,7 +147,7 @@ fn reading(
     // Data first: programs use them in whatever order the files are given.
     for wanted in [false, true] {
         for (index, file) in files.iter().enumerate().filter(|(_, f)| has_moves(f) == wanted) {
-            module.file(reader(index, file)?, wanted)?;
+            module.file(reader(index, file)?)?;
         }
     }
     module.unvisited();
@@ -197,11 +202,11 @@ struct Module<'a> {
 }
 
 impl Module<'_> {
-    fn file(&mut self, mut reader: Reader<'_>, moves: bool) -> Result<()> {
+    fn file(&mut self, mut reader: Reader<'_>) -> Result<()> {
+        let moves = has_moves(reader.file);
         self.start_afresh();
         self.flow.file_begins(reader.index);
         (self.now, self.motion_data, self.path_data, self.spline) = (self.begun(), None, None, None);
-        let system = reader.file.name.to_ascii_lowercase().ends_with("$config.dat");
         while !reader.done() {
             let Some(word) = reader.name() else {
                 reader.skip_line();
@@ -232,7 +237,7 @@ impl Module<'_> {
                 self.bas(&mut reader);
             } else {
                 self.waits(&word);
-                self.assignment(&mut reader, moves, system || moves)?;
+                self.assignment(&mut reader)?;
             }
             reader.skip_line();
         }
@@ -240,7 +245,7 @@ impl Module<'_> {
     }
 
     /// `[DECL] [GLOBAL] [TYPE] NAME[n] = value`.
-    fn assignment(&mut self, reader: &mut Reader<'_>, moves: bool, no_targets: bool) -> Result<()> {
+    fn assignment(&mut self, reader: &mut Reader<'_>) -> Result<()> {
         let (file, line) = (reader.index, reader.line());
         let Some((name, component)) = assigned(reader) else { return Ok(()) };
         if name == "$IPO_MODE" {
@@ -265,14 +270,14 @@ impl Module<'_> {
             "FDAT_ACT" => self.use_data(&value),
             "LDAT_ACT" => self.path_data = Some(self.keeps_by_data(&value)),
             _ => {
-                if !no_targets
+                if declares_targets(reader.file)
                     && let Value::Aggregate(a) = &value
                     && (a.has(&["S", "T"]) || a.has(&AXIS_NAMES))
                 {
                     self.declared.push((name.clone(), file, line));
                 }
                 self.refuse_twins(&name, &value, reader)?;
-                let value = if moves { self.copied(&name, value) } else { value };
+                let value = if has_moves(reader.file) { self.copied(&name, value) } else { value };
                 self.values.insert(name, value);
             }
         }
