@@ -188,48 +188,9 @@ impl Selection {
             ordered.push((columns, place, prior));
         }
         ordered.sort_by_key(|(columns, _, _)| std::cmp::Reverse(columns.len()));
-        for (columns, place, prior) in ordered {
-            for c in columns {
-                let column = &layout.columns[c];
-                let is_pose = layout.mountings.iter().chain(&layout.placements).any(|r| r.contains(&c));
-                if is_pose {
-                    let what = format!("{} is part of a pose, which takes no prior", short_name(&column.name));
-                    return Err(Error::new(
-                        Code::ParameterNotFixable,
-                        place,
-                        what,
-                        "give priors for robot, camera or plate shape",
-                    ));
-                }
-                let camera = layout.cameras.iter().any(|r| r.contains(&c));
-                if camera && (prior.mean.is_none() || prior == &StatedPrior { mean: prior.mean, ..Default::default() })
-                {
-                    let what = format!("the prior of {} needs mean and sigma", short_name(&column.name));
-                    return Err(Error::new(
-                        Code::SettingMissing,
-                        place,
-                        what,
-                        "a camera has no nominal values: write { mean = ..., sigma... = ... }",
-                    ));
-                }
-                let sigma = prior.sigma_in(&place, &column.name, column.unit)?;
-                if let Some(mean) = prior.mean.filter(|m| !m.is_finite()) {
-                    return Err(Error::new(
-                        Code::SettingRange,
-                        place,
-                        format!("mean = {mean}"),
-                        "give a finite number",
-                    ));
-                }
-                let column = &mut layout.columns[c];
-                column.prior_sigma = sigma.unwrap_or(column.prior_sigma);
-                if let Some(mean) = prior.mean {
-                    column.prior_mean = mean;
-                    state.set_value(layout, c, mean);
-                }
-            }
-        }
-        Ok(())
+        ordered.into_iter().try_for_each(|(columns, place, prior)| {
+            columns.into_iter().try_for_each(|c| set_prior(layout, state, c, (&place, prior)))
+        })
     }
 
     /// In words, for the record; empty where nothing was chosen.
@@ -248,4 +209,31 @@ impl Selection {
         }
         words
     }
+}
+
+/// Gives a column a prior, and a mean that is stated to its parameter.
+fn set_prior(layout: &mut Layout, state: &mut State, c: usize, (place, prior): (&str, &StatedPrior)) -> Result<()> {
+    let column = &layout.columns[c];
+    if layout.mountings.iter().chain(&layout.placements).any(|r| r.contains(&c)) {
+        let what = format!("{} is part of a pose, which takes no prior", short_name(&column.name));
+        let remedy = "give priors for robot, camera or plate shape";
+        return Err(Error::new(Code::ParameterNotFixable, place, what, remedy));
+    }
+    let camera = layout.cameras.iter().any(|r| r.contains(&c));
+    if camera && (prior.mean.is_none() || prior == &StatedPrior { mean: prior.mean, ..Default::default() }) {
+        let what = format!("the prior of {} needs mean and sigma", short_name(&column.name));
+        let remedy = "a camera has no nominal values: write { mean = ..., sigma... = ... }";
+        return Err(Error::new(Code::SettingMissing, place, what, remedy));
+    }
+    let sigma = prior.sigma_in(place, &column.name, column.unit)?;
+    if let Some(mean) = prior.mean.filter(|m| !m.is_finite()) {
+        return Err(Error::new(Code::SettingRange, place, format!("mean = {mean}"), "give a finite number"));
+    }
+    let column = &mut layout.columns[c];
+    column.prior_sigma = sigma.unwrap_or(column.prior_sigma);
+    if let Some(mean) = prior.mean {
+        column.prior_mean = mean;
+        state.set_value(layout, c, mean);
+    }
+    Ok(())
 }
