@@ -7,7 +7,7 @@ use super::cell::{CellFiles, Ends};
 use super::pictures::Pictures;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Notice, Result};
-use crate::identify::{bring_together, measure};
+use crate::identify::{NamedSeries, bring_together, measure};
 use crate::output::{recover, restore, solution_json::SolutionRecord};
 use crate::problem::MeasuredSeries;
 use crate::series::{self, InputFile, RecordingOptions, Series, Source};
@@ -121,14 +121,14 @@ impl Inputs {
             files.extend(s.inputs.iter().chain(hashes).cloned());
         }
         let mut series = Vec::with_capacity(all.len());
-        let several = all.len() > 1;
         for s in &all {
             let _stage = stage("images");
             if let Source::Cameras(_) = &s.source {
                 notices.extend(s.notices.iter().cloned());
             }
             for view in s.views() {
-                let measured = measure(view, &chain, several, limits, |_| watch(&view.name, view.stops.stops.len()))?;
+                let named = NamedSeries { series: view, is_one_of_several: all.len() > 1 };
+                let measured = measure(named, &chain, limits, |_| watch(&view.name, view.stops.stops.len()))?;
                 // What the readings give reason to say is the same for every camera.
                 let known: Vec<Notice> = measured.notices.into_iter().filter(|n| !notices.contains(n)).collect();
                 notices.extend(known);

@@ -48,6 +48,7 @@ pub use controller::readings::{postures_are_computed, readings_of};
 pub use dry_run::dry_run;
 pub use estimator::Estimator;
 pub use model_choice::lens_choice::{choose_lens, depths_m};
+pub use observations::bodies::NamedSeries;
 pub use observations::detections::{
     SeenSeries, Unused, detect_images, detect_stops, flat_field_drift, pictures, require_some,
 };

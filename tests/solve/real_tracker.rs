@@ -5,7 +5,9 @@ use std::path::Path;
 use crate::robots::shared;
 use nalgebra::{DMatrix, DVector, Vector3};
 use robotcal::assess::{Limits, MeasuredPoint, PointFit, fit_points, folds, predict_image, refitted};
-use robotcal::identify::{Estimator, JointNoise, Options, PoseStage, Solution, fit_poses, identify, measure};
+use robotcal::identify::{
+    Estimator, JointNoise, NamedSeries, Options, PoseStage, Solution, fit_poses, identify, measure,
+};
 use robotcal::linalg::{SymmetricFactor, product};
 use robotcal::model::camera::Lens;
 use robotcal::model::joint_terms::{LOCAL_RANGE, Term};
@@ -110,9 +112,9 @@ fn study_of_series_on_the_tracker() {
         let chain = urdf.chain(series.manifest.base.as_deref(), series.manifest.tip.as_deref()).unwrap();
         let measured = |names: &[&str]| -> Vec<MeasuredSeries> {
             let one = |n: &&str| {
-                measure(&robotcal::series::read(&real.join(n)).unwrap(), &chain, true, &Limits::default(), |_| {})
-                    .unwrap()
-                    .series
+                let series = &robotcal::series::read(&real.join(n)).unwrap();
+                let named = NamedSeries { series, is_one_of_several: true };
+                measure(named, &chain, &Limits::default(), |_| {}).unwrap().series
             };
             names.iter().map(one).collect()
         };
@@ -166,9 +168,9 @@ fn confirms(real: &Path, names: &[&str], selections: &[&[usize]], tracker: &str)
     let nominal = fit_points(&Robot::nominal(chain.clone()), &points).unwrap().rms_m;
     let measured: Vec<MeasuredSeries> = (names.iter())
         .map(|name| {
-            measure(&robotcal::series::read(&real.join(name)).unwrap(), &chain, true, &Limits::default(), |_| {})
-                .unwrap()
-                .series
+            let series = &robotcal::series::read(&real.join(name)).unwrap();
+            let named = NamedSeries { series, is_one_of_several: true };
+            measure(named, &chain, &Limits::default(), |_| {}).unwrap().series
         })
         .collect();
     let (mut wrong, mut ratios) = (Vec::new(), Vec::new());
@@ -284,7 +286,8 @@ fn parts_of_the_noise_model_switched_off() {
         let series = robotcal::series::read(&real.join(name)).unwrap();
         let chain = urdf.chain(series.manifest.base.as_deref(), series.manifest.tip.as_deref()).unwrap();
         let points = tracker_points(&real.join(tracker));
-        let measured = measure(&series, &chain, false, &Limits::default(), |_| {}).unwrap().series;
+        let named = NamedSeries { series: &series, is_one_of_several: false };
+        let measured = measure(named, &chain, &Limits::default(), |_| {}).unwrap().series;
         for lens in [Lens::Brown, Lens::ThinPrism] {
             let measured = [MeasuredSeries { lens, lens_choice: LensChoice::Settled, ..measured.clone() }];
             let solution = match identify(chain.clone(), &measured, &Options::default()) {

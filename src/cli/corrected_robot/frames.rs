@@ -17,7 +17,7 @@ use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, TouchPlace, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
 
-use crate::identify::{leave_out_repeated_bodies, measure_bodies, mirror_image, touch_mistake};
+use crate::identify::{NamedSeries, leave_out_repeated_bodies, measure_bodies, mirror_image, touch_mistake};
 use crate::output::corrections::FileFinding;
 use crate::output::frame_files::{self, Frames, Named};
 use crate::output::frame_findings::{frame_findings, mirror_image_fits};
@@ -272,7 +272,7 @@ fn read_touches(args: &FramesArgs, record: &SolutionRecord, description: &RobotD
         holds_touches(folder)?;
         let s = series::read(folder)?;
         same_links(&s, record)?;
-        let measured = measure_bodies(&s, &chain, false)?;
+        let measured = measure_bodies(NamedSeries { series: &s, is_one_of_several: false }, &chain)?;
         beside.add(s.joints_beside(&chain));
         files.extend(s.inputs);
         notices.extend(measured.notices);

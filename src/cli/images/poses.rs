@@ -14,7 +14,7 @@ use crate::cli::terminal::progress;
 use crate::cli::terminal::say::{say, say_line};
 use crate::diagnose::Finding;
 use crate::error::{Code, Error, Notice, Result};
-use crate::identify::{PoseSigma, StandAlone, bring_together, measure, stand_alone};
+use crate::identify::{NamedSeries, PoseSigma, StandAlone, bring_together, measure, stand_alone};
 use crate::output::poses_record::{usual, worst};
 use crate::output::stand_alone_files::{self, StandAloneContext, stand_alone_files};
 use crate::output::{REPORT, ResultFolder, folder_name};
@@ -115,7 +115,8 @@ fn observe(series: &[Series], limits: &Limits) -> Result<(Vec<MeasuredSeries>, V
     let (mut all, mut notices) = (Vec::new(), Vec::new());
     let watch = progress::of_series();
     for s in series {
-        let found = measure(s, &Chain::empty(), series.len() > 1, limits, |_| watch(&s.name, s.stops.stops.len()))?;
+        let named = NamedSeries { series: s, is_one_of_several: series.len() > 1 };
+        let found = measure(named, &Chain::empty(), limits, |_| watch(&s.name, s.stops.stops.len()))?;
         notices.extend(found.notices);
         all.push(found.series);
     }

@@ -1,8 +1,9 @@
 //! Files of a series to measurements of bodies: names, sigmas and frames as the manifest says.
 
+use super::stated::on_the_tip_beside_others;
 use crate::error::{Code, Error, Result};
 use crate::problem::{BodySeen, InstrumentKind, SeenBody, SeenLength};
-use crate::series::Series;
+use crate::series::{DEFAULT_PLACEMENT, Series};
 
 /// Sigma of a coordinate and of a rotation about an axis where nothing states them, m and rad.
 const DEFAULT_SIGMA: (f64, f64) = (1e-4, 2e-4);
@@ -10,26 +11,38 @@ const DEFAULT_SIGMA: (f64, f64) = (1e-4, 2e-4);
 /// The body that touches, where contacts do not name it.
 const TOUCHING: &str = "contact";
 
-/// Names that several series do not share by their defaults.
-struct Qualified<'a> {
-    series: &'a Series,
-    several: bool,
+/// A series, and whether its names are told from those of others.
+#[derive(Clone, Copy)]
+pub struct NamedSeries<'a> {
+    /// What was read.
+    pub series: &'a Series,
+    /// True where it is one of several, which do not share by default what they do not name.
+    pub is_one_of_several: bool,
 }
 
-impl Qualified<'_> {
-    fn name(&self, name: &str) -> String {
-        if self.several { format!("{} {name}", self.series.name) } else { name.to_owned() }
+impl NamedSeries<'_> {
+    fn qualified(&self, name: &str) -> String {
+        if self.is_one_of_several { format!("{} {name}", self.series.name) } else { name.to_owned() }
+    }
+
+    /// Name of a placement: the default one is that of its series alone, and a plate on the tip is not one in the cell.
+    pub(super) fn placement(&self, placement: &str) -> String {
+        let own = match self.is_one_of_several && placement == DEFAULT_PLACEMENT {
+            true => format!("{placement} of {}", self.series.run_name()),
+            false => placement.to_owned(),
+        };
+        if on_the_tip_beside_others(self.series) { format!("{own} on the tip") } else { own }
     }
 }
 
-/// What was measured of bodies in a series; `several` series qualify the names that they do not share.
-pub(super) fn seen_bodies(series: &Series, several: bool) -> Vec<SeenBody> {
-    let qualified = Qualified { series, several };
+/// What was measured of bodies in a series.
+pub(super) fn seen_bodies(named: NamedSeries) -> Vec<SeenBody> {
+    let series = named.series;
     let files = &series.spatial;
     let tracker = series.manifest.tracker.clone().unwrap_or_default();
     let instrument = tracker.name.clone().unwrap_or_else(|| series.name.clone());
     // A tracker that is named sees the same bodies in every series.
-    let body = |target: &str| if tracker.name.is_some() { target.to_owned() } else { qualified.name(target) };
+    let body = |target: &str| if tracker.name.is_some() { target.to_owned() } else { named.qualified(target) };
     let sigma_m = |row: Option<f64>| row.or(tracker.sigma_m).unwrap_or(DEFAULT_SIGMA.0);
     let point = |row: &crate::series::PointRow| SeenBody {
         stop: row.stop,
@@ -59,9 +72,9 @@ pub(super) fn seen_bodies(series: &Series, several: bool) -> Vec<SeenBody> {
         };
         SeenBody {
             stop: row.stop,
-            instrument: qualified.name(&name),
+            instrument: named.qualified(&name),
             kind,
-            body: qualified.name(TOUCHING),
+            body: named.qualified(TOUCHING),
             seen: BodySeen::Point(place),
             sigma_m: contact.sigma_m.unwrap_or(DEFAULT_SIGMA.0),
             sigma_rad: DEFAULT_SIGMA.1,
@@ -75,16 +88,16 @@ pub(super) fn seen_bodies(series: &Series, several: bool) -> Vec<SeenBody> {
 ///
 /// # Errors
 /// An end that nothing names.
-pub(super) fn seen_lengths(series: &Series, several: bool, bodies: &[SeenBody]) -> Result<Vec<SeenLength>> {
-    let qualified = Qualified { series, several };
+pub(super) fn seen_lengths(named: NamedSeries, bodies: &[SeenBody]) -> Result<Vec<SeenLength>> {
+    let series = named.series;
     let is_known = |name: &String| bodies.iter().any(|b| &b.instrument == name || &b.body == name);
     let is_marker = |name: &String| name.parse::<u32>().is_ok_and(|id| series.plate.index_of(id).is_some());
     let mut lengths = Vec::new();
     // A target that the tracker lost everywhere is known by name, and has no place.
     let is_lost = |name: &String| series.spatial.lost.contains(name);
     for given in series.manifest.distance.iter().filter(|d| !d.between.iter().all(is_marker)) {
-        let named = |name: &String| if is_known(name) { name.clone() } else { qualified.name(name) };
-        let between = given.between.each_ref().map(named);
+        let full = |name: &String| if is_known(name) { name.clone() } else { named.qualified(name) };
+        let between = given.between.each_ref().map(full);
         let unknown = |end: &usize| !is_known(&between[*end]);
         if let Some(unknown) = (0..2).find(|end| unknown(end) && !is_lost(&given.between[*end])) {
             let what =

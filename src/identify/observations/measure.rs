@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::bodies::{seen_bodies, seen_lengths};
+use super::bodies::{NamedSeries, seen_bodies, seen_lengths};
 use super::detections::{
     SeenSeries, Unused, detect_stops, flat_field_drift, no_images, recording, require_some, several_cameras,
 };
 use super::seen_image::SeenImage;
-use super::stated::{lens_of, measured_series, on_the_tip_beside_others};
+use super::stated::{lens_of, measured_series};
 use crate::assess::Limits;
 use crate::detect::{Detection, set_radii};
 use crate::error::{Code, Error, Notice, Result};
@@ -34,21 +34,20 @@ struct StopObservations {
     remedy: Option<String>,
 }
 
-/// Reads joint values in the order of the chain and finds the plate in every image; `series` is what one camera saw. `several` series qualify the names
-/// that a single one leaves to its defaults; `limits` are those of the solve. `progress` is called after every image, from any thread.
+/// Reads joint values in the order of the chain and finds the plate in every image of what one camera saw; `limits` are those of the solve. `progress` is called after every image, from any thread.
 ///
 /// # Errors
 /// Of the readings (unit, missing joints), of a series none of whose images can be used, and of differently sized images.
 pub fn measure(
-    series: &Series,
+    named: NamedSeries,
     chain: &Chain,
-    several: bool,
     limits: &Limits,
     progress: impl Fn(&Path) + Sync,
 ) -> Result<MeasuredWithNotices> {
+    let series = named.series;
     let measured = |readings| match series.source {
-        Source::NoImages => bodies_at(series, chain, several, readings),
-        _ => seen_at(series, chain, several, (limits, &progress), readings),
+        Source::NoImages => bodies_at(named, chain, readings),
+        _ => seen_at(named, chain, (limits, &progress), readings),
     };
     let refused = match readings_of(series, chain) {
         Ok(readings) => return measured(readings),
@@ -63,14 +62,13 @@ pub fn measure(
 
 /// What was seen at these readings.
 fn seen_at(
-    series: &Series,
+    named: NamedSeries,
     chain: &Chain,
-    several: bool,
     (limits, progress): (&Limits, impl Fn(&Path) + Sync),
     readings: Vec<Option<Vec<f64>>>,
 ) -> Result<MeasuredWithNotices> {
-    let bodies = seen_bodies(series, several);
-    let lengths = seen_lengths(series, several, &bodies)?;
+    let (series, bodies) = (named.series, seen_bodies(named));
+    let lengths = seen_lengths(named, &bodies)?;
     let mut notices = notices_of(series, chain);
     let lens = lens_of(series)?;
     let mut plate = series.plate.clone();
@@ -106,7 +104,7 @@ fn seen_at(
     let size_px = image_size(series, found_size)?;
     let mut stops = Vec::with_capacity(readings.len());
     for (k, ((stop, readings), seen)) in series.stops.stops.iter().zip(readings).zip(seen.drain(..)).enumerate() {
-        let placement = placement_of(series, &stop.placement, several);
+        let placement = named.placement(&stop.placement);
         let StopObservations { observations, left_out, .. } = seen;
         let (image, row) = (stop.image.clone(), series.row(k));
         stops.push(MeasuredStop { row, image, readings, placement, observations, left_out });
@@ -137,19 +135,14 @@ pub fn image_size(series: &Series, found: Option<(u32, u32)>) -> Result<(u32, u3
 ///
 /// # Errors
 /// Of the readings (unit, missing joints); distances between what was not measured.
-pub fn measure_bodies(series: &Series, chain: &Chain, several: bool) -> Result<MeasuredWithNotices> {
-    bodies_at(series, chain, several, readings_of(series, chain)?)
+pub fn measure_bodies(named: NamedSeries, chain: &Chain) -> Result<MeasuredWithNotices> {
+    bodies_at(named, chain, readings_of(named.series, chain)?)
 }
 
 /// What was measured in space alone at these readings.
-fn bodies_at(
-    series: &Series,
-    chain: &Chain,
-    several: bool,
-    readings: Vec<Option<Vec<f64>>>,
-) -> Result<MeasuredWithNotices> {
-    let bodies = seen_bodies(series, several);
-    let lengths = seen_lengths(series, several, &bodies)?;
+fn bodies_at(named: NamedSeries, chain: &Chain, readings: Vec<Option<Vec<f64>>>) -> Result<MeasuredWithNotices> {
+    let (series, bodies) = (named.series, seen_bodies(named));
+    let lengths = seen_lengths(named, &bodies)?;
     let stops = without_images(series, readings);
     let postures = other_postures(series, chain, (&stops.stops, &bodies));
     Ok(MeasuredWithNotices {
@@ -181,15 +174,6 @@ fn without_images(series: &Series, readings: Vec<Option<Vec<f64>>>) -> MeasuredS
     let run = series.run.as_ref().map(|run| run.name.clone());
     let order_known = series.manifest.robot.order == StopOrder::Visited;
     MeasuredSeries { run, ..MeasuredSeries::without_images(&series.name, order_known, stops) }
-}
-
-/// Name of a placement: the default one is that of its series alone, and a plate on the tip is not one in the cell.
-fn placement_of(series: &Series, placement: &str, several: bool) -> String {
-    let own = match several && placement == crate::series::DEFAULT_PLACEMENT {
-        true => format!("{placement} of {}", series.run_name()),
-        false => placement.to_owned(),
-    };
-    if on_the_tip_beside_others(series) { format!("{own} on the tip") } else { own }
 }
 
 /// What all stops show, and the size of the images.

@@ -4,7 +4,7 @@
 //! contacts measured, `stated` what the manifest says of the camera; `together` looks at several series:
 //! `plates` says which show one plate, `repeated` which are one recording.
 
-mod bodies;
+pub(super) mod bodies;
 pub(super) mod detections;
 pub(super) mod measure;
 mod plates;
