@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::limits::Limits;
 use super::mean_square::MeanSquare;
-use super::root_mean_square;
+use super::root_of_mean;
 use super::statistics::extent;
 use super::stops::halton_stops;
 use super::used_stops::{still, stops};
@@ -217,7 +217,7 @@ impl<'a> FlangeModel<'a> {
             let c = self.propagated(&pose, &j, self.covariance);
             (0..3).map(|k| c[(k, k)]).sum::<f64>().max(0.0)
         };
-        root_mean_square(&samples.iter().map(|s| (square(s), 1.0)).collect::<Vec<_>>())
+        root_of_mean(samples.iter().map(square))
     }
 
     /// How far a step of the columns that act through the camera poses moves the flange, and the stated sigma: lengths, RMS over the region of the stops, m.
@@ -227,7 +227,7 @@ impl<'a> FlangeModel<'a> {
             let (pose, j) = self.derivative(s);
             (self.fitted_out(&pose, j) * step).rows(0, 3).norm_squared()
         };
-        let moved = root_mean_square(&samples.iter().map(|s| (square(s), 1.0)).collect::<Vec<_>>());
+        let moved = root_of_mean(samples.iter().map(square));
         [moved, self.sigma_m(&samples)]
     }
 

@@ -58,7 +58,9 @@ pub use projection::ProjectionMap;
 pub use promise::{FlangeErrors, FlangeIntervals, NoiseAtStop, by_readings, scatter_m, usual_joint_sigma};
 pub use propagate::{PredictedPose, View, predict_pose};
 pub use repeating::stops_for_one;
-pub use statistics::{Ratio, best_run, bootstrap_ratio, by_cluster, log_chance, most_of_sum, root_mean_square};
+pub use statistics::{
+    Ratio, best_run, bootstrap_ratio, by_cluster, log_chance, most_of_sum, root_mean_square, root_of_mean,
+};
 pub use stops::{Structural, ideal_stops, minimal_set, structural};
 pub use truth::{camera_errors_m, flange_error_m};
 pub use uncertainty::{NORMAL_95, Uncertainty, judge};

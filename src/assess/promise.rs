@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::flange::FlangeModel;
 use super::points::{MeasuredPoint, PointFit, lay_over};
-use super::root_mean_square;
+use super::root_of_mean;
 use crate::model::joint_terms::Term;
 use crate::model::robot::{Posture, Robot};
 use crate::solve::{JOINT_NOISE_FLOOR, NoiseInformation, Spread};
@@ -116,7 +116,7 @@ fn displacements(a: &Robot, b: &Robot, samples: &[Posture], stops: &[Posture]) -
 }
 
 fn rms(displacements: &[Vector3<f64>]) -> f64 {
-    root_mean_square(&displacements.iter().map(|d| (d.norm_squared(), 1.0)).collect::<Vec<_>>())
+    root_of_mean(displacements.iter().map(|d| d.norm_squared()))
 }
 
 /// Mean square over samples by which a reading of each joint moves the position of the flange, m^2 for 1 rad or m.
@@ -157,7 +157,7 @@ impl NoiseAtStop<'_> {
 /// Joint noise of a stop, RMS over stops with different noise, rad or m.
 pub fn usual_joint_sigma(of_stops: &[Vec<f64>]) -> Vec<f64> {
     let readings = of_stops.first().map_or(0, Vec::len);
-    let of = |r: usize| root_mean_square(&of_stops.iter().map(|s| (s[r] * s[r], 1.0)).collect::<Vec<_>>());
+    let of = |r: usize| root_of_mean(of_stops.iter().map(|s| s[r] * s[r]));
     (0..readings).map(of).collect()
 }
 

@@ -76,6 +76,12 @@ pub fn root_mean_square(units: &[(f64, f64)]) -> f64 {
     (s / w).sqrt()
 }
 
+/// Root of the mean of squares that count alike.
+pub fn root_of_mean(squares: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = squares.into_iter().fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
+    (sum / count).sqrt()
+}
+
 /// Upper end of the 95 % interval of a sum of independent variances, each with the upper end of its own: `s + sqrt(sum_i (u_i - s_i)^2)`
 /// (F. Graybill, C.-M. Wang, *Confidence intervals on nonnegative linear combinations of variances*, 1980).
 pub fn most_of_sum(parts: impl IntoIterator<Item = [f64; 2]>) -> f64 {

@@ -11,7 +11,7 @@ use super::knowledge::{Knowledge, scatter_m};
 use super::robot::KnownRobot;
 use super::start::start;
 use super::touch::{Touch, TouchPlace, Touches};
-use crate::assess::{Limits, root_mean_square};
+use crate::assess::{Limits, root_of_mean};
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::linalg::{SymmetricFactor, product};
@@ -292,8 +292,7 @@ fn missed(robot: &KnownRobot, touches: &Touches, unknowns: &Unknowns, t: &Touch)
 /// By the closed form that the fit starts from: what the touches miss, m RMS, and unknown places in the work object, m; `None` where there is none.
 pub fn closed_form(robot: &KnownRobot, touches: &Touches, given: &Given) -> Option<(f64, Vec<Vector3<f64>>)> {
     let unknowns = start(robot, touches, &Columns::new(touches, given), given)?;
-    let squares = touches.all.iter().map(|t| (missed(robot, touches, &unknowns, t).norm_squared(), 1.0));
-    let rms_m = root_mean_square(&squares.collect::<Vec<_>>());
+    let rms_m = root_of_mean(touches.all.iter().map(|t| missed(robot, touches, &unknowns, t).norm_squared()));
     rms_m.is_finite().then_some((rms_m, unknowns.places))
 }
 
@@ -387,9 +386,7 @@ impl Work<'_> {
         let has_work = self.touches.frame.is_some();
         let knowledge = Knowledge::new(self.robot, columns, (&solved.inverse, &solved.step), &solved.absorbed);
         let (tool, none) = (&unknowns.tools[0], Knowledge::none(self.robot));
-        let rms = |of: &dyn Fn(&Posture) -> f64| {
-            root_mean_square(&self.region.iter().map(|p| (of(p).powi(2), 1.0)).collect::<Vec<_>>())
-        };
+        let rms = |of: &dyn Fn(&Posture) -> f64| root_of_mean(self.region.iter().map(|p| of(p).powi(2)));
         let expected = Expected {
             with_frames_m: rms(&|p| knowledge.sigma_m(self.robot, p, tool, &unknowns.work)),
             without_m: rms(&|p| none.sigma_m(self.robot, p, tool, &unknowns.work)),

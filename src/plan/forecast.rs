@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::choose::{Demand, Plan, PlanRequest};
-use crate::assess::root_mean_square;
+use crate::assess::root_of_mean;
 use crate::error::{Code, Error, Result};
 use crate::linalg::SymmetricFactor;
 use crate::plan::criterion::Criterion;
@@ -166,10 +166,10 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
                 setting.stop(&plan.adjustment.state, "", &c.readings, c.placement)
             }));
             let covariance = exact_covariance(&plan.adjustment, setting, stops).ok()?;
-            Some((flange_m(&plan.weight, &covariance).powi(2), 1.0))
+            Some(flange_m(&plan.weight, &covariance).powi(2))
         };
-        let squares: Vec<(f64, f64)> = (0..RANDOM_DRAWS).into_par_iter().filter_map(one).collect();
-        (!squares.is_empty()).then(|| root_mean_square(&squares))
+        let squares: Vec<f64> = (0..RANDOM_DRAWS).into_par_iter().filter_map(one).collect();
+        (!squares.is_empty()).then(|| root_of_mean(squares))
     };
     let mut curve = Vec::new();
     for count in counts(n) {

@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::simulated::measured;
-use crate::assess::{Ratio, bootstrap_ratio, flange_error_m, root_mean_square};
+use crate::assess::{Ratio, bootstrap_ratio, flange_error_m, root_of_mean};
 use crate::error::{Code, Result};
 use crate::geom::Pose;
 use crate::identify::{JointNoise, Options, RobotModel, identify};
@@ -94,14 +94,12 @@ const ROUGH: (f64, f64) = (5e-3, 0.01);
 impl PlanStudy {
     /// RMS over the worlds of the error found over views of the plate: planned, random, m.
     pub fn views_m(&self) -> [f64; 2] {
-        [0, 1].map(|k| root_mean_square(&self.rows.iter().map(|r| (r.views_m[k].powi(2), 1.0)).collect::<Vec<_>>()))
+        [0, 1].map(|k| root_of_mean(self.rows.iter().map(|r| r.views_m[k].powi(2))))
     }
 
     /// RMS over the worlds of (planned found, planned predicted, random found, random predicted), m.
     pub fn overall_m(&self) -> [f64; 4] {
-        let rms = |of: fn(&PlanStudyRow) -> f64| {
-            root_mean_square(&self.rows.iter().map(|r| (of(r).powi(2), 1.0)).collect::<Vec<_>>())
-        };
+        let rms = |of: fn(&PlanStudyRow) -> f64| root_of_mean(self.rows.iter().map(|r| of(r).powi(2)));
         [rms(|r| r.planned_m[0]), rms(|r| r.planned_m[1]), rms(|r| r.random_m[0]), rms(|r| r.random_m[1])]
     }
 }

@@ -11,7 +11,7 @@ use super::verify_stated::Stated;
 use super::verify_verdict::{Gain, Measured, Reasons, of_series};
 use super::verify_zeros::{read_otherwise, words, zero_off};
 use super::zeros::Zeros;
-use crate::assess::{Limits, Ratio, bootstrap_ratio, by_cluster, root_mean_square};
+use crate::assess::{Limits, Ratio, bootstrap_ratio, by_cluster, root_mean_square, root_of_mean};
 use crate::calibration::{Ends, Inputs, Observed};
 use crate::cli::Verdict;
 use crate::cli::flags::recording::RecordingArgs;
@@ -189,9 +189,7 @@ fn by_other_readings(urdf: &Path, model: &Model, seen: &Verified<'_>) -> Option<
 /// Readings of the stops, and a point as far from the tip as what stands still, along no axis.
 fn at_images(robot: &Robot, series: &[MeasuredSeries]) -> (Vec<Vec<f64>>, Vector3<f64>) {
     let readings: Vec<Vec<f64>> = series.iter().flat_map(|s| &s.stops).filter_map(|s| s.readings.clone()).collect();
-    let squares: Vec<(f64, f64)> =
-        readings.iter().map(|q| (robot.base_from_tip(q).translation.norm_squared(), 1.0)).collect();
-    let lever_m = root_mean_square(&squares);
+    let lever_m = root_of_mean(readings.iter().map(|q| robot.base_from_tip(q).translation.norm_squared()));
     (readings, Vector3::repeat(lever_m / 3.0f64.sqrt()))
 }
 

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Vector3, Vector6};
 
 use super::compensate_frames::{NoSolution, Side, part, solution};
 use crate::assess::{
-    Limits, MeasuredPoint, NORMAL_95, PredictedFlange, by_readings, fit_points, freedom, most_of_sum, root_mean_square,
+    Limits, MeasuredPoint, NORMAL_95, PredictedFlange, by_readings, fit_points, freedom, most_of_sum, root_of_mean,
 };
 use crate::diagnose::Weight;
 use crate::error::{Error, Result};
@@ -228,8 +228,8 @@ fn is_input(record: &SolutionRecord, file: &InputFile) -> bool {
 }
 
 fn rms(lengths: impl Iterator<Item = f64>) -> f64 {
-    let squares: Vec<(f64, f64)> = lengths.map(|m| (m * m, 1.0)).collect();
-    if squares.is_empty() { 0.0 } else { root_mean_square(&squares) }
+    let squares: Vec<f64> = lengths.map(|m| m * m).collect();
+    if squares.is_empty() { 0.0 } else { root_of_mean(squares) }
 }
 
 /// How the tip of a second robot stands to that of a first one, without what a tool takes up: body twists.

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::fit::{PoseStage, fit_joint, fit_poses};
 use crate::assess::{
     ImageError, bootstrap_ratio, by_cluster, camera_errors_m, cluster_of_images, error_of_predicted, flange_error_m,
-    folds, refitted_near, regions, root_mean_square, seen_pose,
+    folds, refitted_near, regions, root_mean_square, root_of_mean, seen_pose,
 };
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
@@ -243,9 +243,9 @@ pub fn truth_error(state: &State, truth: &Truth) -> Result<Option<TruthError>> {
             (predicted.inverse(), mount.camera_from_plate(&camera, tip, &plate).inverse())
         })
         .collect();
-    let off: Vec<(f64, f64)> = camera_errors_m(&pairs).iter().map(|e| (e.norm_squared(), 1.0)).collect();
+    let camera_m = root_of_mean(camera_errors_m(&pairs).iter().map(|e| e.norm_squared()));
     // With the plate in the hand the flange is judged in the frame of the camera's stand, which is gauge as well.
     let frame = if mount == CameraMount::Hand { plate } else { Pose::identity() };
     Ok(flange_error_m(&state.robot, &frame, &held)
-        .map(|flange| TruthError { flange_mm: 1e3 * flange, camera_mm: 1e3 * root_mean_square(&off) }))
+        .map(|flange| TruthError { flange_mm: 1e3 * flange, camera_mm: 1e3 * camera_m }))
 }
