@@ -159,7 +159,7 @@ impl<'a> FlangeModel<'a> {
 
     /// Pose relative to what stands still, and `J`, 6 x columns that act through the camera poses.
     fn derivative(&self, stop: &Posture) -> (Pose, DMatrix<f64>) {
-        let kinematics = self.robot.kinematics(stop, &vec![0.0; stop.readings.len()]);
+        let kinematics = self.robot.kinematics_at(stop);
         let pose = self.still.inverse() * self.exported.base_from_tip_at(stop);
         let mut j = DMatrix::zeros(6, self.layout.theta_len());
         for (k, d) in kinematics.d_twists.iter().enumerate() {

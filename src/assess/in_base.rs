@@ -19,7 +19,7 @@ pub fn sigma_in_base(
     readings: &[f64],
     tip_from_tool: &Pose,
 ) -> f64 {
-    let kinematics = robot.kinematics(&Posture::at(readings), &vec![0.0; readings.len()]);
+    let kinematics = robot.kinematics_at(&Posture::at(readings));
     let to_tool = adjoint(&tip_from_tool.inverse());
     let mut j = DMatrix::zeros(6, layout.theta_len());
     for (k, d) in kinematics.d_twists.iter().enumerate() {

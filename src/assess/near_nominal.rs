@@ -75,7 +75,7 @@ fn mean_square_displacement(robot: &Robot, layout: &Layout, columns: &[usize]) -
 
 /// Displacement of the tip in its own frame by columns of the robot, and by base (6) and tool (3).
 fn derivatives(robot: &Robot, layout: &Layout, columns: &[usize], at: &Posture) -> (DMatrix<f64>, DMatrix<f64>) {
-    let kinematics = robot.kinematics(at, &vec![0.0; at.readings.len()]);
+    let kinematics = robot.kinematics_at(at);
     let mut j = DMatrix::zeros(3, columns.len());
     for (place, &c) in columns.iter().enumerate() {
         j.set_column(place, &layout.derivative(&kinematics, c).fixed_rows::<3>(0));

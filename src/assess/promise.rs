@@ -123,7 +123,7 @@ fn rms(displacements: &[Vector3<f64>]) -> f64 {
 pub fn by_readings(robot: &Robot, samples: &[Posture]) -> Vec<f64> {
     let mut squares = vec![0.0; robot.chain.readings.len()];
     for sample in samples {
-        let moved = robot.kinematics(sample, &vec![0.0; sample.readings.len()]).d_readings;
+        let moved = robot.kinematics_at(sample).d_readings;
         squares.iter_mut().zip(&moved).for_each(|(sum, d)| *sum += d.fixed_rows::<3>(0).norm_squared());
     }
     squares.iter().map(|sum| sum / samples.len().max(1) as f64).collect()

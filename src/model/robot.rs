@@ -129,6 +129,11 @@ impl Robot {
         self.kinematics_from(&self.linear_origins(), stop, noise)
     }
 
+    /// As [`Robot::base_from_tip_at`], with all derivatives.
+    pub fn kinematics_at(&self, stop: &Posture) -> Kinematics {
+        self.kinematics(stop, &vec![0.0; stop.readings.len()])
+    }
+
     /// As [`Robot::kinematics`], where the origins of this robot are at hand.
     pub fn kinematics_from(&self, origins: &LinearOrigins, stop: &Posture, noise: &[f64]) -> Kinematics {
         let (positions, bases) = self.positions(stop, noise);

@@ -173,7 +173,7 @@ pub fn flange_weight(problem: &Problem, robot: &Robot, targets: &[Vec<f64>]) -> 
     let layout = &problem.layout;
     let mut d = DMatrix::zeros(3 * targets.len(), layout.len());
     for (k, readings) in targets.iter().enumerate() {
-        let kinematics = robot.kinematics(&Posture::at(readings), &vec![0.0; readings.len()]);
+        let kinematics = robot.kinematics_at(&Posture::at(readings));
         let tip = kinematics.base_from_tip;
         for (i, twist) in kinematics.d_twists.iter().enumerate() {
             let moved = tip.rotation * twist.fixed_rows::<3>(0);
@@ -208,7 +208,7 @@ fn without_frames(robot: &Robot, targets: &[Vec<f64>], d: DMatrix<f64>) -> DMatr
 pub fn share_left(robot: &Robot, targets: &[Vec<f64>]) -> f64 {
     let mut d = DMatrix::zeros(3 * targets.len(), 6 * robot.twists.len());
     for (k, readings) in targets.iter().enumerate() {
-        let kinematics = robot.kinematics(&Posture::at(readings), &vec![0.0; readings.len()]);
+        let kinematics = robot.kinematics_at(&Posture::at(readings));
         for (i, twist) in kinematics.d_twists.iter().enumerate() {
             let moved = kinematics.base_from_tip.rotation * twist.fixed_rows::<3>(0);
             d.view_mut((3 * k, 6 * i), (3, 6)).copy_from(&moved);

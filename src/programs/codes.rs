@@ -56,7 +56,7 @@ pub struct Branch {
 impl Branch {
     /// Of the arm with these six axes (readings) at `q`; its foot's x is forward.
     pub fn of(robot: &Robot, axes: &[usize; 6], q: &[f64]) -> Self {
-        let k = robot.kinematics(&Posture::at(q), &vec![0.0; q.len()]);
+        let k = robot.kinematics_at(&Posture::at(q));
         let to_base = adjoint(&k.base_from_tip);
         let line = |axis: usize| {
             let twist: Vector6<f64> = to_base * k.d_readings[axes[axis]];

@@ -121,7 +121,7 @@ pub(super) fn same_posture(a: &[f64], b: &[f64]) -> bool {
 
 /// Motion of the tip by the readings that are free.
 fn jacobian(robot: &Robot, q: &[f64], held: &[bool]) -> Matrix6xX<f64> {
-    let columns = robot.kinematics(&At::at(q), &vec![0.0; q.len()]).d_readings;
+    let columns = robot.kinematics_at(&At::at(q)).d_readings;
     let is_free = |i: usize| !held.get(i).copied().unwrap_or(false);
     let free: Vec<_> = columns.iter().enumerate().filter(|(i, _)| is_free(*i)).map(|(_, column)| *column).collect();
     Matrix6xX::from_columns(&free)
