@@ -248,6 +248,40 @@ fn solution_json_alone_gives_the_same_solution_again() {
 }
 
 #[test]
+fn solutions_differ_by_as_much_as_both_let_expect() {
+    const DRAWS: usize = 100;
+    let record = record_of(&solved(CameraMount::Hand, RobotModel::Rigid));
+    let model = found_model(&record).unwrap();
+    let (twists, terms) = (&model.layout.twists, &model.layout.terms);
+    let robot = twists.clone().chain(terms.clone().take(record.robot.terms.len()));
+    let used: Vec<usize> = robot.filter(|&c| model.covariance[(c, c)] > 0.0).collect();
+    let covariance = DMatrix::from_fn(used.len(), used.len(), |i, j| model.covariance[(used[i], used[j])]);
+    let root = covariance.cholesky().unwrap().l();
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut ratios = Vec::new();
+    for _ in 0..DRAWS {
+        let step = &root * DVector::from_fn(used.len(), |_, _| StandardNormal.sample(&mut rng));
+        let mut drawn = record.clone();
+        for (&c, by) in used.iter().zip(step.iter()) {
+            let joints = &mut drawn.robot.joints;
+            match c.checked_sub(terms.start) {
+                Some(term) => drawn.robot.terms[term].value += by,
+                None => joints[(c - twists.start) / 6].twist[(c - twists.start) % 6] += by,
+            }
+        }
+        let found = compare_solutions(&record, &drawn).unwrap();
+        let flange = found.covered.unwrap();
+        // Only one of the two was drawn.
+        ratios.push(2.0 * (flange.rms_m / flange.stated_m.unwrap()).powi(2));
+        assert!(!flange.disagrees());
+    }
+    let mean = ratios.iter().sum::<f64>() / DRAWS as f64;
+    let sigma = (ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / DRAWS as f64).sqrt() / (DRAWS as f64).sqrt();
+    println!("{mean} +- {sigma}");
+    assert!((mean - 1.0).abs() < 4.0 * sigma, "{mean} +- {sigma}");
+}
+
+#[test]
 fn the_flange_scatters_as_its_covariance_says() {
     const DRAWS: usize = 400;
     let record = record_of(&solved(CameraMount::Hand, RobotModel::Rigid));

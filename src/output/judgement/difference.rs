@@ -23,12 +23,13 @@ pub struct Difference {
     pub worst_m: f64,
     /// Readings at the worst place.
     pub worst_at: Vec<f64>,
-    /// RMS of the stated sigmas of both together at these places, m; none where a solution has no map.
+    /// What the stated uncertainties of both let expect of the RMS distance, m, what base frames and point of the flange take up left out; none where
+    /// a solution states none.
     pub stated_m: Option<f64>,
 }
 
 impl Difference {
-    /// Sigmas by which the flange differs: the RMS distance over the stated sigma of both, no more than one where the two are as good as they say.
+    /// Sigmas by which the flange differs: the RMS distance over that which is to be expected, about one where the two are as good as they say.
     pub fn sigmas(&self) -> Option<f64> {
         self.stated_m.filter(|stated| *stated > 0.0).map(|stated| self.rms_m / stated)
     }
@@ -107,20 +108,20 @@ fn difference(a: &FoundModel, b: &FoundModel, places: &[&[f64]]) -> Option<Diffe
         return None;
     }
     // The flange of the first as a device would see it; frame and point on the flange of the second are fitted.
-    let points = places.iter().map(|q| MeasuredPoint::on_tip(&a.robot, &Vector3::zeros(), &Posture::at(q)));
-    let fit = fit_points(&b.robot, &points.collect::<Vec<_>>())?;
+    let points: Vec<MeasuredPoint> =
+        places.iter().map(|q| MeasuredPoint::on_tip(&a.robot, &Vector3::zeros(), &Posture::at(q))).collect();
+    let fit = fit_points(&b.robot, &points)?;
     let (worst, worst_m) = (fit.residuals_m.iter().map(|r| r.norm()).enumerate()).max_by(|x, y| x.1.total_cmp(&y.1))?;
-    let stated = || {
-        let (a, b) = (a.flange()?, b.flange()?);
-        let sum: f64 = (places.iter()).map(|q| a.at(q).sigmas()[0].powi(2) + b.at(q).sigmas()[0].powi(2)).sum();
-        Some((sum / places.len() as f64).sqrt())
+    let stated_m = |of: &FoundModel| {
+        let known = of.known_robot(None).ok()?;
+        Some(fit.expected((&of.robot, None), &points, known.covariance(), &vec![0.0; of.joint_sigma.len()])?.model_m)
     };
     Some(Difference {
         places: places.len(),
         rms_m: fit.rms_m,
         worst_m,
         worst_at: places[worst].to_vec(),
-        stated_m: stated(),
+        stated_m: stated_m(a).zip(stated_m(b)).map(|(a, b)| a.hypot(b)),
     })
 }
 
