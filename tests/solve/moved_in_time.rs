@@ -211,6 +211,19 @@ fn a_zero_that_creeps_is_not_called_mastered_anew() {
     }
 }
 
+#[test]
+fn a_zero_that_moved_leaves_no_plate_in_two_places() {
+    for seed in 21..25 {
+        let mut series = measured(&seen(CameraMount::Hand, 40, seed), &kr6());
+        series.stops[22..].iter_mut().filter_map(|s| s.readings.as_mut()).for_each(|q| q[2] -= 1e-3);
+        let options = Options { model: RobotModel::Rigid, ..Options::default() };
+        let solution = identify(kr6(), &[series], &options).unwrap();
+        let gates: Vec<Code> = solution.failed_gates().iter().map(|f| f.code()).collect();
+        println!("{seed}: {gates:?}");
+        assert!(gates.contains(&Code::ZeroMoved) && !gates.contains(&Code::PlateDisplaced), "{gates:?}");
+    }
+}
+
 /// Observations that state a noise of a pixel leave a pixel and more: no camera that does not fit.
 #[test]
 fn stated_noise_is_no_misfit_of_the_camera() {

@@ -81,6 +81,11 @@ impl Displaced {
         self.explains_most && !matches!(self.displacement, Displacement::AxisUp(_)) && self.mounting == mounting
     }
 
+    /// True where it stands in two places by turns.
+    pub(in crate::diagnose) fn is_by_turns(&self) -> bool {
+        self.displacement == Displacement::ByTurns
+    }
+
     /// True where measurements with this instrument scatter because of it.
     pub(in crate::diagnose) fn explains_scatter_of(&self, instrument: &str) -> bool {
         self.explains_most && self.is_measured() && self.mounting == instrument
