@@ -149,6 +149,27 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     doubts
 }
 
+/// By how much plates are larger than stated for a robot that is held, each with its standard deviation: where `fitted` has camera and plates fitted
+/// to it, all lengths are the robot's. None of a plate whose size nothing tells.
+pub fn sizes_by_robot(fitted: &Adjustment) -> Vec<PlateSize> {
+    let of = |plate: usize| {
+        let SizeDifference { off, sigma } = ReleasedSize::of(fitted, plate).one_step()?;
+        Some(PlateSize { plate: fitted.problem.plate_name(plate), off, sigma })
+    };
+    (0..fitted.problem.plates.len()).filter_map(of).collect()
+}
+
+/// How large a plate is for a robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlateSize {
+    /// The plate; its number where there are several.
+    pub plate: String,
+    /// By how much it is larger than stated, relative.
+    pub off: f64,
+    /// Standard deviation of that, that of the stated size included; the robot counts as exact.
+    pub sigma: f64,
+}
+
 /// Plates whose rows and columns differ in scale, as images alone say: their shape needs no robot.
 pub fn uneven_plates(adjustment: &Adjustment, limits: &Limits) -> Vec<DoubtedSize> {
     let all = (0..adjustment.problem.plates.len()).filter_map(|k| Some((k, uneven(adjustment, k, limits)?)));

@@ -282,6 +282,7 @@ codes! {
     Input "Earlier results" {
         SolutionDamaged "solution_damaged" "a solution.json is not as the program wrote it",
         SolutionDiffers "solution_differs" "a solution.json is of another robot or series",
+        SolutionUntrusted "solution_untrusted" "the solution.json that is used failed checks of its own",
         StatedExceeded "stated_exceeded" "a model misses more in another measurement than its solution states",
         OwnMeasurement "own_measurement" "a model is judged by what it was fitted to",
         ModelsNotTold "models_not_told" "a measurement does not tell a model from the nominal one",

@@ -68,4 +68,4 @@ pub use solution::{Evidence, LensEvidence, Solution};
 pub use start_verdict::{StartReached, StartVerdict};
 pub use two_stage::compare::{beside_two_stages, compare, truth_error};
 pub use two_stage::fit::{Estimate, PoseStage, estimate_all, fit_joint, fit_poses, linear_step};
-pub use verify::{JudgedImage, JudgedSeries, RobotOfOtherZeros, in_told_postures, verify_series};
+pub use verify::{JudgedByImages, JudgedImage, JudgedSeries, RobotOfOtherZeros, in_told_postures, verify_series};

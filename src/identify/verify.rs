@@ -9,7 +9,7 @@ use super::start::turns;
 use super::start::zeros::other_zeros;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
-use crate::diagnose::{ZeroOff, zeros_off};
+use crate::diagnose::{PlateSize, ZeroOff, sizes_by_robot, zeros_off};
 use crate::error::{Code, Error, Result};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries};
@@ -31,8 +31,8 @@ pub struct JudgedImage {
 /// What a series says of a robot that it was not fitted to.
 #[derive(Debug, Clone, PartialEq)]
 pub enum JudgedSeries {
-    /// The errors of all images.
-    Images(Vec<JudgedImage>),
+    /// The errors of all images, and the sizes of the plates.
+    Images(JudgedByImages),
     /// Its readings and the images do not belong together, and do with other zeros of its joints.
     OtherZeros(Box<RobotOfOtherZeros>),
 }
@@ -41,10 +41,19 @@ impl JudgedSeries {
     /// Its images; none with the zeros as they are where others are needed.
     pub fn into_images(self) -> Vec<JudgedImage> {
         match self {
-            Self::Images(images) => images,
+            Self::Images(judged) => judged.images,
             Self::OtherZeros(_) => Vec::new(),
         }
     }
+}
+
+/// What images say of a robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JudgedByImages {
+    /// The error of each.
+    pub images: Vec<JudgedImage>,
+    /// How large the plates are for this robot: no error of an image holds what all its lengths are off by.
+    pub sizes: Vec<PlateSize>,
 }
 
 /// A robot with other zeros than those of the one that is judged.
@@ -98,7 +107,7 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) 
 }
 
 /// Errors of images that camera and plate were not fitted to.
-fn held_out(adjustment: Adjustment, limits: &Limits) -> Result<Vec<JudgedImage>> {
+fn held_out(adjustment: Adjustment, limits: &Limits) -> Result<JudgedByImages> {
     let outcome = estimate_components(adjustment, &ComponentOptions::default());
     if outcome.status != Status::Converged {
         return Err(Error::new(
@@ -118,5 +127,6 @@ fn held_out(adjustment: Adjustment, limits: &Limits) -> Result<Vec<JudgedImage>>
         posture: postures[i],
         error,
     };
-    Ok(errors.into_iter().map(judged).collect())
+    let images = errors.into_iter().map(judged).collect();
+    Ok(JudgedByImages { images, sizes: sizes_by_robot(&outcome.adjustment) })
 }

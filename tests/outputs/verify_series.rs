@@ -141,6 +141,33 @@ fn a_model_that_misses_more_than_its_solution_states_is_not_trusted() {
     assert!(mm > 1.0, "{mm}");
 }
 
+/// A robot whose links are all too long or too short sees the plate as large as that, and misses no image: the size that the plate has tells.
+#[test]
+fn a_model_of_another_size_than_the_plate_is_not_trusted() {
+    let urdf = root().join("reports/kr6_small/kuka_kr6_r900.calibrated.urdf");
+    let nominal = kr6_urdf();
+    let folder = tempfile::tempdir().unwrap();
+    let series = simulated(&urdf, &folder.path().join("same"), "none", &[]);
+    let plate = series.join("plate.csv");
+    let table = std::fs::read_to_string(&plate).unwrap();
+    let (head, rows) = table.split_once('\n').unwrap();
+    for (size, is_trusted) in [(1.0001, true), (1.002, false), (0.998, false)] {
+        let scaled = |row: &str| {
+            let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+            cells[1..3].iter_mut().for_each(|cell| *cell = (size * cell.parse::<f64>().unwrap()).to_string());
+            cells.join(",")
+        };
+        let rows: Vec<String> = rows.lines().map(scaled).collect();
+        std::fs::write(&plate, format!("{head}\n{}\n", rows.join("\n"))).unwrap();
+        for flags in [&["--nominal", nominal.to_str().unwrap()][..], &[]] {
+            let (exit, said, mm) = verdict(&urdf, &series, flags);
+            println!("{size}: {exit:?} {said:?} {mm} mm");
+            assert_eq!(said.contains(&Code::PlateSizeContradicted), !is_trusted, "{size}: {said:?}");
+            assert_eq!(exit, Some(i32::from(!is_trusted)), "{size}: {said:?}");
+        }
+    }
+}
+
 /// What a robot misses is what it misses with its own zeros: those that would fit are said, and are not its merit. A robot that others are compared
 /// with is not judged.
 #[test]

@@ -250,6 +250,39 @@ fn a_program_with_measured_frames_brings_the_tool_where_it_was_meant() {
     assert_says(&other.said(), Code::SolutionDiffers, &["kuka_kr6_r900.urdf"]);
 }
 
+/// A result that failed its checks is passed on with that, whatever the touches and the program say.
+#[test]
+fn what_comes_from_a_solution_that_failed_is_not_to_be_trusted() {
+    let Files { folder, touches, .. } = files("base_link", Pose::identity(), 5);
+    let copied = folder.path().join("failed");
+    std::fs::create_dir(&copied).unwrap();
+    for name in ["kuka_kr6_r900.calibrated.urdf", "compensation.toml"] {
+        std::fs::copy(repo("reports/kr6_small").join(name), copied.join(name)).unwrap();
+    }
+    let mut record: serde_json::Value = serde_json::from_slice(&std::fs::read(repo(SOLUTION)).unwrap()).unwrap();
+    let finding =
+        serde_json::json!({"code": "plate_moved", "weight": "gate", "subject": [], "quantities": [], "text": ""});
+    record["failed_gates"] = serde_json::json!(["the plate moved"]);
+    record["findings"].as_array_mut().unwrap().push(finding);
+    let solution = copied.join("solution.json");
+    std::fs::write(&solution, serde_json::to_vec(&record).unwrap()).unwrap();
+    let path = |p: &Path| p.to_str().unwrap().to_owned();
+    let (kr6, urdf) = (path(&repo(KR6)), path(&copied.join("kuka_kr6_r900.calibrated.urdf")));
+    let frames = folder.path().join("frames");
+    let run = robotcal(&["frames", "--from", &path(&solution), "--touches", &path(&touches)], &frames).expect(1);
+    let said: serde_json::Value = serde_json::from_slice(&std::fs::read(frames.join("frames.json")).unwrap()).unwrap();
+    let codes: Vec<_> = said["findings"].as_array().unwrap().iter().map(|f| &f["code"]).collect();
+    assert_eq!(codes, ["solution_untrusted"], "{}", run.said());
+    let program = folder.path().join("t.csv");
+    std::fs::write(&program, format!("{}\n0,-1.2,1.4,0,0.6,0\n", world().truth.chain.readings.join(","))).unwrap();
+    let compensation = path(&copied.join("compensation.toml"));
+    let mut args = vec!["compensate", program.to_str().unwrap(), "--nominal", &kr6, "--urdf", &urdf];
+    args.extend(["--compensation", &compensation, "--joint-unit", "rad", "--base", "base_link", "--tip", "tool0"]);
+    args.extend(["--frames", "nominal"]);
+    let run = robotcal(&args, &folder.path().join("out")).expect(1);
+    assert_eq!(findings(&run)["solution_untrusted"].0, "gate", "{}", run.said());
+}
+
 /// Places of a fixture under the name of the base would move the whole program by where the fixture stands.
 #[test]
 fn places_of_another_frame_than_the_base_are_told() {

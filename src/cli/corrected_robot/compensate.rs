@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
-use super::compensate_frames::{Choice, Side, Sides, known_error};
+use super::compensate_frames::{Choice, Side, Sides, known_error, solution};
 use super::compensate_models::{corrected_already, equal, exchanged, not_given};
 use super::controller_base::controller_base;
 use crate::cli::Verdict;
@@ -20,7 +20,7 @@ use crate::files;
 use crate::geom::Pose;
 use crate::model::joint_terms::Term;
 use crate::model::robot::Robot;
-use crate::output::corrections::{self, FileFinding, Meant, TABLE};
+use crate::output::corrections::{self, FileFinding, Meant, TABLE, untrusted};
 use crate::output::written_programs::{OfOthers, RunFinding, WrittenProgram, require_same_source, seen_from};
 use crate::output::{ResultFolder, compensated};
 use crate::programs::compensate::Compensated;
@@ -307,6 +307,10 @@ fn model_findings(
     // From a real robot to a nominal one is a retargeting as any other.
     if sides.from.is_none() {
         findings.extend(exchanged(models.controller, nominal, sides)?);
+    }
+    for side in [&sides.to].into_iter().chain(&sides.from) {
+        let record = solution(side, None)?.ok();
+        findings.extend(record.and_then(|record| untrusted(&record, Weight::Gate, side.urdf.display())));
     }
     findings.extend(not_given(&sides.to, args.compensation.as_deref(), "--compensation"));
     let taught = sides.from.as_ref();

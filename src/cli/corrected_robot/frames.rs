@@ -18,7 +18,7 @@ use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, TouchPlace, Tou
 use crate::geom::{Pose, matrix_from_rpy};
 
 use crate::identify::{NamedSeries, leave_out_repeated_bodies, measure_bodies, mirror_image, touch_mistake};
-use crate::output::corrections::FileFinding;
+use crate::output::corrections::{FileFinding, untrusted};
 use crate::output::frame_files::{self, Frames, Named};
 use crate::output::frame_findings::{frame_findings, mirror_image_fits};
 use crate::output::frames_record::{
@@ -112,6 +112,7 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     let work = frames.work.clone().filter(|_| is_carried.is_none());
     let of_controller = Frames { work, ..frames.clone() };
     findings.extend(is_carried);
+    findings.extend(untrusted(&record, Weight::Gate, args.from.display()));
     let robot_record = RobotOfFrames {
         solution: InputFile::of_file(&args.from)?,
         name: record.robot.name.clone(),

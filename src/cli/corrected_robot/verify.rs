@@ -138,6 +138,7 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
     }
     let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
     reasons.findings.extend(of_other);
+    reasons.findings.extend(stated.as_ref().and_then(|s| s.untrusted(&args.urdf)));
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     Ok(reasons.verdict())
 }

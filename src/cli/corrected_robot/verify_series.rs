@@ -17,11 +17,11 @@ use crate::cli::Verdict;
 use crate::cli::flags::recording::RecordingArgs;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::say::say_line;
-use crate::diagnose::{Finding, Weight};
+use crate::diagnose::{Finding, PlateSize, Weight};
 use crate::error::{Code, Error, Result};
 use crate::identify::{
-    JudgedImage, JudgedSeries, Options, RobotModel, RobotOfOtherZeros, Selection, identify, in_told_postures,
-    postures_are_computed, verify_series,
+    JudgedByImages, JudgedImage, JudgedSeries, Options, RobotModel, RobotOfOtherZeros, Selection, identify,
+    in_told_postures, postures_are_computed, verify_series,
 };
 use crate::model::robot::Robot;
 use crate::output::compensated;
@@ -45,13 +45,13 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
         let zeros = zeros(args, &model, &files)?;
         let seen =
             Verified { series: &with_added(series, &missing(zeros.as_ref())), files: &files, zeros: zeros.as_ref() };
-        let images = match judged((&model.robot, &args.urdf), seen.series, &model.limits)? {
-            JudgedSeries::Images(images) => images,
+        let JudgedByImages { images, sizes } = match judged((&model.robot, &args.urdf), seen.series, &model.limits)? {
+            JudgedSeries::Images(judged) => judged,
             JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
         };
         let images: Vec<&JudgedImage> = images.iter().collect();
         say_line!("{}", line("model", &args.urdf, &images));
-        return Ok(weigh(args, &model, (&seen, &images), None).verdict());
+        return Ok(weigh(args, &model, (&seen, &images, &sizes), None).verdict());
     };
     // Poses of a controller are those of the model that is in it, whichever robot is judged by them.
     let nominal_inputs = read(file)?;
@@ -63,8 +63,8 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let missing = missing(zeros.as_ref());
     let series = in_told_postures(&model.robot, &with_added(series, &missing), &model.limits);
     let seen = Verified { series: &series, files: &files, zeros: zeros.as_ref() };
-    let images = match judged((&model.robot, &args.urdf), &series, &model.limits)? {
-        JudgedSeries::Images(images) => images,
+    let JudgedByImages { images, sizes } = match judged((&model.robot, &args.urdf), &series, &model.limits)? {
+        JudgedSeries::Images(judged) => judged,
         JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
     };
     let as_shown: Vec<f64> = missing.iter().map(|offset| -offset).collect();
@@ -73,7 +73,7 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let (images, nominal) = of_both(&images, &nominal);
     let ratio = compare(args, file, &images, &nominal)?;
     let gain = Gain { ratio, nominal: &robot, of: "images", at: at_images(&model.robot, &series) };
-    Ok(weigh(args, &model, (&seen, &images), Some(gain)).verdict())
+    Ok(weigh(args, &model, (&seen, &images, &sizes), Some(gain)).verdict())
 }
 
 /// What is judged, with what its solution states and the limits with which that was found.
@@ -127,7 +127,7 @@ struct Verified<'a> {
 fn weigh(
     args: &VerifyArgs,
     model: &Model,
-    (seen, images): (&Verified<'_>, &[&JudgedImage]),
+    (seen, images, sizes): (&Verified<'_>, &[&JudgedImage], &[PlateSize]),
     gain: Option<Gain<'_>>,
 ) -> Reasons {
     let Model { robot, stated, of_other, limits } = model;
@@ -140,8 +140,10 @@ fn weigh(
     if let Some(stated) = stated.as_ref().filter(|s| s.was_fitted_to(seen.files, seen.series)) {
         reasons.add_own(urdf, stated);
     }
+    reasons.findings.extend(sizes.iter().filter_map(|size| of_another_size(size, model, (urdf, seen.series))));
     let side = Side { robot, urdf, solution: None };
     reasons.findings.extend(of_other.clone());
+    reasons.findings.extend(stated.as_ref().and_then(|s| s.untrusted(urdf)));
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     if reasons.misses() || is_unexplained {
         match by_other_readings(urdf, model, seen) {
@@ -150,6 +152,30 @@ fn weigh(
         }
     }
     reasons
+}
+
+/// A plate that the model contradicts: its lengths are as wrong as the size of the plate, and no image shows it.
+fn of_another_size(size: &PlateSize, model: &Model, (urdf, series): (&Path, &[MeasuredSeries])) -> Option<FileFinding> {
+    let PlateSize { plate, off, .. } = size;
+    let sigma = size.sigma.hypot(model.stated.as_ref().map_or(0.0, Stated::size_sigma));
+    if off.abs() <= model.limits.plate_size_sigmas * sigma {
+        return None;
+    }
+    let (readings, _) = at_images(&model.robot, series);
+    let tips: Vec<Vector3<f64>> = readings.iter().map(|q| model.robot.base_from_tip(q).translation).collect();
+    let middle = tips.iter().sum::<Vector3<f64>>() / tips.len().max(1) as f64;
+    let off_m = off.abs() * root_of_mean(tips.iter().map(|tip| (tip - middle).norm_squared()));
+    let text = format!(
+        "{plate}: for this model it is {:.3} % (+- {:.3} %) {} than its file says, so that the lengths of the model are off by that, {:.3} mm RMS at the \
+         stops, which no other figure here holds; check the size of this plate, and that of the plate from which the model was identified: measure two far \
+         markers of each and give [scale]",
+        100.0 * off.abs(),
+        100.0 * sigma,
+        if *off > 0.0 { "larger" } else { "smaller" },
+        1e3 * off_m
+    );
+    let quantities = [("relative_size", *off), ("sigma", sigma), ("rms_mm", 1e3 * off_m)];
+    Some(FileFinding::new(Code::PlateSizeContradicted, Weight::Gate, urdf.display(), quantities, text))
 }
 
 /// A model that is judged with its own zeros, which do not fit: there is no figure of it, and which zeros would fit is said.
@@ -223,7 +249,7 @@ fn compared(
     limits: &Limits,
 ) -> Result<(Robot, Vec<JudgedImage>)> {
     let other = match judged((&robot, file), series, limits)? {
-        JudgedSeries::Images(images) => return Ok((robot, images)),
+        JudgedSeries::Images(judged) => return Ok((robot, judged.images)),
         JudgedSeries::OtherZeros(other) => *other,
     };
     let found: Vec<String> = other.zeros.iter().map(words).collect();

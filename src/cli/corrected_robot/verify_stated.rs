@@ -1,6 +1,7 @@
 //! What the solution of a description states of it, to be held against another measurement.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, Vector3, Vector6};
@@ -13,10 +14,10 @@ use crate::diagnose::Weight;
 use crate::error::{Error, Result};
 use crate::model::joint_terms::Term;
 use crate::model::robot::{Posture, Robot};
-use crate::output::corrections::FileFinding;
+use crate::output::corrections::{self, FileFinding};
 use crate::output::restore::{FoundModel, exported_model, measured_series};
 use crate::output::solution_json::{self, SolutionRecord};
-use crate::problem::{Exposures, MeasuredSeries, postures_of_stops};
+use crate::problem::{Exposures, MeasuredSeries, SCALE, postures_of_stops};
 use crate::series::{InputFile, SpatialFiles, is_image};
 
 /// The solution from which a description came, with as much of its model as is judged.
@@ -175,6 +176,18 @@ impl Stated {
         self.record.flange?;
         let [rms_m, most_m] = [0, 1].map(|k| model_m[k].hypot(scatter_m[k]));
         (rms_m > 0.0 && most_m.is_finite()).then_some(Expectation { rms_m, most_m })
+    }
+
+    /// That it failed checks of its own: what is measured here says more of the robot than they do.
+    pub fn untrusted(&self, urdf: &Path) -> Option<FileFinding> {
+        corrections::untrusted(&self.record, Weight::Note, urdf.display())
+    }
+
+    /// Relative standard deviation of the size of the plates, and so of all lengths.
+    pub fn size_sigma(&self) -> f64 {
+        let FoundModel { layout, covariance, .. } = &self.found;
+        let variance = |shape: &Range<usize>| covariance[(shape.start + SCALE, shape.start + SCALE)];
+        layout.shapes.iter().map(variance).fold(0.0, f64::max).sqrt()
     }
 
     /// Whether one of these files of measurements is an input of the solution, or one of these series shows an exposure of it: files of other

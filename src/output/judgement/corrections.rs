@@ -1,6 +1,6 @@
 //! What a corrected program is worth, beside its text: corrections.csv and findings.json.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::{Display, Write as _};
 
 use serde::{Deserialize, Serialize};
@@ -13,6 +13,7 @@ use crate::frames::{Knowledge, KnownRobot};
 use crate::geom::Pose;
 use crate::model::robot::{Posture, Robot};
 use crate::output::restore::FoundModel;
+use crate::output::solution_json::SolutionRecord;
 use crate::programs::compensate::{Compensated, RESIDUAL};
 use crate::programs::{KnownError, Left, Program, Target, TargetKind, TargetOutcome};
 use crate::urdf::Chain;
@@ -52,6 +53,19 @@ impl FileFinding {
     ) -> Self {
         Self { code, weight, subject: subject.to_string(), quantities: numbers(quantities), text }
     }
+}
+
+/// A solution that failed checks of its own, which what is made with it inherits; `None` of any other.
+pub fn untrusted(record: &SolutionRecord, weight: Weight, subject: impl Display) -> Option<FileFinding> {
+    let failed = record.findings.iter().filter(|f| f.weight == Weight::Gate);
+    let codes: BTreeSet<&str> = failed.map(|f| f.code.name()).collect();
+    let codes = codes.into_iter().collect::<Vec<_>>().join(", ");
+    let text = format!(
+        "the solution that it comes from is not to be trusted ({codes}), and what is wrong there is wrong here: see `robotcal show`, mend the series and identify again"
+    );
+    let quantities = [("checks_failed", record.failed_gates.len() as f64)];
+    (!record.failed_gates.is_empty())
+        .then(|| FileFinding::new(Code::SolutionUntrusted, weight, subject, quantities, text))
 }
 
 /// Numbers by name.
