@@ -19,6 +19,7 @@ mod patterns;
 mod points;
 mod points_apart;
 mod points_mistaken;
+mod points_size;
 mod points_tell;
 mod projection;
 mod promise;
@@ -53,6 +54,7 @@ pub use patterns::{Bearer, Pattern, PatternTest, camera_shows_pattern, cause, pa
 pub use points::{Derivatives, ExpectedRms, ExpectedSquares, MeasuredPoint, PointFit, fit_points, freedom};
 pub use points_apart::{DeviceMoved, MARKERS_DRAWN_ALONG, OddPoints, StepCause, device_moved, farthest, odd_points};
 pub use points_mistaken::{ReadingMistake, reading_mistake};
+pub use points_size::{SizeOfPoints, size_of_points};
 pub use points_tell::LeftOpen;
 pub use projection::ProjectionMap;
 pub use promise::{FlangeErrors, FlangeIntervals, NoiseAtStop, by_readings, scatter_m, usual_joint_sigma};

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use nalgebra::Vector3;
 use robotcal::Code;
-use robotcal::assess::{DeviceMoved, Limits, MeasuredPoint, StepCause, device_moved, fit_points, odd_points};
+use robotcal::assess::{
+    DeviceMoved, Limits, MeasuredPoint, StepCause, device_moved, fit_points, odd_points, size_of_points,
+};
 use robotcal::identify::Estimator;
 use robotcal::model::joint_terms::{JointTerm, Term};
 use robotcal::model::robot::Robot;
@@ -122,6 +124,22 @@ fn points(robot: &Robot, count: usize, noise_m: f64) -> Vec<MeasuredPoint> {
         MeasuredPoint { position_m: at + noise_m * Vector3::from(error), readings }
     };
     (0..count).map(point).collect()
+}
+
+#[test]
+fn points_of_a_device_of_another_size_tell_it() {
+    let ((_, robot), limits) = (kr6(), Limits::default());
+    let seen = points(&robot, 40, NOISE_M);
+    let fit = fit_points(&robot, &seen).unwrap();
+    assert_eq!(size_of_points(&robot, &seen, &fit, &limits), None);
+    for off in [0.001, -0.003, 0.03] {
+        let mut scaled = seen.clone();
+        scaled.iter_mut().for_each(|p| p.position_m *= 1.0 + off);
+        let of_scaled = fit_points(&robot, &scaled).unwrap();
+        let found = size_of_points(&robot, &scaled, &of_scaled, &limits).unwrap();
+        println!("{off}: {found:?}, {} m", of_scaled.rms_m);
+        assert!((found.off - off).abs() < 1e-4 && (found.left_m / fit.rms_m - 1.0).abs() < 0.05, "{off}: {found:?}");
+    }
 }
 
 #[test]

@@ -55,6 +55,8 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("assess/points_apart.rs DRAWN_ALONG", "which are left out first"),
     ("assess/points_apart.rs MARKERS_DRAWN_ALONG", "which are let go first"),
     ("assess/points_apart.rs POINT", "coordinates of a point"),
+    ("assess/points_size.rs STEP", "by which residuals are differentiated"),
+    ("assess/points_size.rs STEPS", "rounds of a search"),
     ("assess/projection.rs ACROSS", "grid of a map"),
     ("assess/repeating.rs FEWEST", "samples of a variance"),
     ("assess/statistics.rs RESAMPLINGS", "samples of a bootstrap"),

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use super::compensate_frames::Side;
 use super::compensate_models::not_given;
 use super::verify_args::VerifyArgs;
-use super::verify_points::{Laid, apart, open};
+use super::verify_points::{Laid, apart, of_another_size, open};
 use super::verify_series;
 use super::verify_stated::Stated;
 use super::verify_verdict::{Gain, Measured, Reasons};
@@ -131,8 +131,10 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
         };
         let stated_here = stated.as_ref().zip(expected.map(|expected| expected.all));
         reasons.add(&Measured { urdf: &args.urdf, rms_m, stated: stated_here, gain }, limits);
-        if !reasons.is_bad() {
-            let judged = without.as_ref().unwrap_or(&model);
+        let judged = without.as_ref().unwrap_or(&model);
+        if reasons.misses() {
+            reasons.findings.extend(of_another_size(judged.laid(), file, limits));
+        } else if !reasons.is_bad() {
             reasons.findings.extend(open(judged.laid(), stated.as_ref(), file, limits));
         }
     }

@@ -5,7 +5,8 @@ use std::path::Path;
 use super::verify_stated::{ExpectedAtPoints, Stated};
 use super::verify_verdict::Reasons;
 use crate::assess::{
-    DeviceMoved, LeftOpen, Limits, MeasuredPoint, OddPoints, PointFit, StepCause, device_moved, odd_points,
+    DeviceMoved, LeftOpen, Limits, MeasuredPoint, OddPoints, PointFit, SizeOfPoints, StepCause, device_moved,
+    odd_points, size_of_points,
 };
 use crate::cli::terminal::say::say_line;
 use crate::diagnose::Weight;
@@ -60,6 +61,22 @@ pub(super) fn open(
     );
     let quantities = [("left_open_mm", left), ("by_priors_mm", usual), ("rms_mm", mm)];
     Some(FileFinding::new(Code::PointsUndetermined, Weight::Gate, file.display(), quantities, text))
+}
+
+/// Points whose device is of another size than the robot, which that explains.
+pub(super) fn of_another_size((robot, points, fit): Laid<'_>, file: &Path, limits: &Limits) -> Option<FileFinding> {
+    let SizeOfPoints { off, left_m } = size_of_points(robot, points, fit, limits)?;
+    let text = format!(
+        "{}: its lengths are {:.3} % {} than those of the model; without that the points leave {:.3} mm instead of {:.3} mm: check the device (its unit, temperature \
+         and reflector constant) and the size of the plate, or of what else the model was identified with: measure two far markers and give [scale]",
+        file.display(),
+        100.0 * off.abs(),
+        if off > 0.0 { "longer" } else { "shorter" },
+        1e3 * left_m,
+        1e3 * fit.rms_m
+    );
+    let quantities = [("relative_size", off), ("rms_undone_mm", 1e3 * left_m)];
+    Some(FileFinding::new(Code::LengthsContradicted, Weight::Gate, file.display(), quantities, text))
 }
 
 /// What stands out, in the words of the verdict.
