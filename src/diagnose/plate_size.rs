@@ -26,15 +26,18 @@ pub enum ToldBy {
     Links,
     /// The same with a rail that moves the arm or the plate, whose readings may be as wrong as the plate's size.
     LinksOnRail,
+    /// Those of the links and of other plates: where these are of another size than stated, they say so of a right one.
+    LinksAndPlates,
     /// Those between poses of a controller: nothing is known of the links.
     Poses,
 }
 
 impl ToldBy {
-    fn of(state: &State) -> Self {
+    fn of(Adjustment { problem, state }: &Adjustment) -> Self {
         match state.robot.chain.pose_coordinates() {
             Some(_) => Self::Poses,
             None if is_on_rail(state) => Self::LinksOnRail,
+            None if problem.plates.len() > 1 => Self::LinksAndPlates,
             None => Self::Links,
         }
     }
@@ -42,6 +45,7 @@ impl ToldBy {
     const fn name(self) -> &'static str {
         match self {
             Self::Links | Self::LinksOnRail => "the links of the robot",
+            Self::LinksAndPlates => "the links of the robot and the other plates",
             Self::Poses => "the positions of the controller",
         }
     }
@@ -111,10 +115,9 @@ impl InOrder {
 }
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<DoubtedSize> {
-    let Adjustment { problem, state } = &fit.adjustment;
-    let limits = setting.limits;
+    let (problem, limits) = (&fit.problem, setting.limits);
     let some = fit.adjustment.some_stops(MOST_STOPS, MOST_STOPS);
-    let told_by = ToldBy::of(state);
+    let told_by = ToldBy::of(&fit.adjustment);
     let mut doubts = Vec::new();
     for (k, stated) in problem.plates.iter().enumerate() {
         let plate = problem.plate_name(k);

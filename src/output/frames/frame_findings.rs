@@ -78,7 +78,7 @@ fn scattered((fit, beside): (&FrameFit, &JointsBeside), limits: &Limits, subject
             false => format!(", or a work object that {} moved, of which no column is given", beside.untold.join(", ")),
         };
         format!(
-            "a loose tip, another order of points, or the wrong robot{untold}; correct sigma_m if they are no better"
+            "a loose tip, another order of points, the wrong robot, or one that was identified with a plate of another size than stated{untold}; correct sigma_m if they are no better"
         )
     } else {
         let joints = beside.moved.join(", ");
