@@ -137,9 +137,15 @@ const fn intrinsic_row(e: usize) -> usize {
 impl Equations {
     /// Every observation, in their order.
     pub fn sights(&self) -> impl Iterator<Item = Sight<'_>> {
+        (0..self.markers.len()).map(|k| self.sight(k))
+    }
+
+    /// One of the observations.
+    #[inline(always)]
+    pub fn sight(&self, observation: usize) -> Sight<'_> {
         let rows = self.columns.nrows();
-        let pairs = self.columns.as_slice().chunks_exact(2 * rows).map(move |pair| pair.split_at(rows));
-        pairs.enumerate().map(|(k, (first, second))| Sight { equations: [first, second], field: self.field.of(k) })
+        let (first, second) = self.columns.as_slice()[2 * rows * observation..][..2 * rows].split_at(rows);
+        Sight { equations: [first, second], field: self.field.of(observation) }
     }
 
     /// Rows of the pose.

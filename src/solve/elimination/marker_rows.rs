@@ -13,7 +13,7 @@ use super::seen_markers::SeenMarkers;
 use crate::linalg::{
     COLUMNS_A_BLOCK, add_combination, mirror_upper, part_of_gram, product_with_rows, transposed_product, wide,
 };
-use crate::problem::{E, Equations, Sight};
+use crate::problem::{E, Equations};
 use crate::solve::linear::LinearImage;
 
 /// Coupling of some unknowns with the markers that were seen, unknowns x 3 markers.
@@ -62,7 +62,8 @@ struct Ordered<'a> {
     image: &'a ImageRows<'a>,
     /// From rows of the equations to those of the unknowns.
     runs: Vec<Run>,
-    sights: Vec<(usize, Sight<'a>)>,
+    /// Number of the marker and place among the observations of the image.
+    order: Vec<(usize, usize)>,
 }
 
 impl<'a> Ordered<'a> {
@@ -71,17 +72,16 @@ impl<'a> Ordered<'a> {
         let row_of = |e: usize| Some((equations.intrinsic_row(e)?, intrinsics[e]?));
         let runs = runs(equations.pose_rows().zip(*pose..).chain((0..E).filter_map(row_of)));
         let number = &seen.number[*plate];
-        let all: Vec<Sight> = equations.sights().collect();
         let numbered = equations.markers.iter().enumerate();
         let mut order: Vec<(usize, usize)> = numbered.filter_map(|(k, &m)| Some((number[m]?, k))).collect();
         order.sort_unstable();
-        Self { image, runs, sights: order.into_iter().map(|(at, k)| (at, all[k])).collect() }
+        Self { image, runs, order }
     }
 
     /// Its observations of some markers.
-    fn of(&self, markers: &Range<usize>) -> &[(usize, Sight<'a>)] {
-        let place = |at: usize| self.sights.partition_point(|sight| sight.0 < at);
-        &self.sights[place(markers.start)..place(markers.end)]
+    fn of(&self, markers: &Range<usize>) -> &[(usize, usize)] {
+        let place = |at: usize| self.order.partition_point(|own| own.0 < at);
+        &self.order[place(markers.start)..place(markers.end)]
     }
 
     /// The rows of its unknowns.
@@ -92,11 +92,13 @@ impl<'a> Ordered<'a> {
 
     /// Adds the coupling with some markers to their columns, in which a row has another place.
     fn add_to(&self, values: &mut DMatrix<f64>, markers: &Range<usize>, place: &[usize]) {
-        let (rows, columns, sights) = (values.nrows(), values.as_mut_slice(), self.of(markers));
+        let (rows, columns, own) = (values.nrows(), values.as_mut_slice(), self.of(markers));
+        let sight = |observation: usize| self.image.equations.sight(observation);
         wide(
             #[inline(always)]
             || {
-                for (at, sight) in sights {
+                for &(at, observation) in own {
+                    let sight = sight(observation);
                     let of_marker = columns[3 * (at - markers.start) * rows..].chunks_exact_mut(rows);
                     for (into, w) in of_marker.zip(sight.by_marker().row_iter()) {
                         for run in &self.runs {
@@ -108,10 +110,11 @@ impl<'a> Ordered<'a> {
                 }
             },
         );
-        for (at, sight) in sights {
+        for &(at, observation) in own {
+            let sight = sight(observation);
             for (point, d) in sight.by_field() {
-                let own = sight.by_marker() * d;
-                for (component, column) in own.column_iter().enumerate() {
+                let coupling = sight.by_marker() * d;
+                for (component, column) in coupling.column_iter().enumerate() {
                     if let Some(row) = self.image.intrinsics[E + 2 * point + component] {
                         (0..3).for_each(|d| values[(place[row], 3 * (at - markers.start) + d)] += column[d]);
                     }
