@@ -97,6 +97,8 @@ pub struct Scene {
     pub rows: u32,
     pub size: (usize, usize),
     pub view: View,
+    /// Focal length of an equidistant fisheye that bends the view around the middle of the picture, px.
+    pub fisheye_px: Option<f64>,
     pub dark: f64,
     pub light: f64,
     /// Gaussian blur, px, beside the area of the pixel.
@@ -116,6 +118,7 @@ impl Scene {
             rows,
             size: (640, 480),
             view,
+            fisheye_px: None,
             dark: 30.0,
             light: 190.0,
             blur: 0.9,
@@ -165,7 +168,17 @@ impl Scene {
 
     /// True position of a corner.
     pub fn corner(&self, marker: u32) -> [f64; 2] {
-        self.view.pixel([f64::from(marker % self.columns), f64::from(marker / self.columns)])
+        let straight = self.view.pixel([f64::from(marker % self.columns), f64::from(marker / self.columns)]);
+        self.about_middle(straight, f64::atan)
+    }
+
+    /// Behind a fisheye, moves a pixel along its radius: tan(angle) to angle, or back.
+    fn about_middle(&self, pixel: [f64; 2], radius: impl Fn(f64) -> f64) -> [f64; 2] {
+        let Some(focal) = self.fisheye_px else { return pixel };
+        let middle = [self.size.0, self.size.1].map(|n| (n as f64 - 1.0) / 2.0);
+        let off = [0, 1].map(|k| (pixel[k] - middle[k]) / focal);
+        let from = off[0].hypot(off[1]).max(1e-12);
+        [0, 1].map(|k| middle[k] + focal * off[k] * radius(from) / from)
     }
 
     /// Renders on a grid three times as fine, blurs there and sums up the pixels: a corner is right to 0.0003 px.
@@ -176,7 +189,7 @@ impl Scene {
         let (w, h) = (FINE * (width + 2 * margin), FINE * (height + 2 * margin));
         let step = 1.0 / FINE as f64;
         let edge = |n: usize| n as f64 * step - margin as f64 - 0.5;
-        let shade = |x: f64, y: f64| self.shade(project(&inverse, [x, y]));
+        let shade = |x: f64, y: f64| self.shade(project(&inverse, self.about_middle([x, y], f64::tan)));
         let corners: Vec<f64> =
             (0..=h).flat_map(|y| (0..=w).map(move |x| (x, y))).map(|(x, y)| shade(edge(x), edge(y))).collect();
         let sharp: Vec<f32> = (0..w * h)

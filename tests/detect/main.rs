@@ -22,6 +22,7 @@ mod circles;
 mod command;
 mod corners_rendered;
 mod drawn_dots;
+mod fisheye;
 mod grids;
 mod image_stage;
 mod puzzleboards;

@@ -7,11 +7,12 @@ use calib_targets_chessboard::ChessCorner;
 
 use super::charuco_markers::{Marker, Print, decode, prints, rare_prints};
 use super::charuco_numbers::{Contradiction, Counting, contradiction};
+use super::charuco_placed::placed;
 use super::charuco_seen::{Seen, elsewhere, ids, instead, side_seen};
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
-use super::lattices::left_over;
-use super::sizes::{best_of_sizes, on_picture};
+use super::lattices::Sorted;
+use super::sizes::{best_of_sizes, on_picture, shows_most};
 use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 use crate::detect::corners::{Window, measure};
 use crate::detect::pictures::bytes::Bytes;
@@ -46,8 +47,9 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let mut bytes = Bytes::of(picture);
     let prints = prints(plate)?;
     let least = if plate.aruco.is_some() { 1 } else { LEAST_MARKERS };
+    let cells_of = plate.aruco.is_some().then_some(picture);
     let best = |prints: &[Print]| {
-        let at_scale = |scale: f64| at_scale(&bytes, scale, prints, board, least);
+        let at_scale = |scale: f64| at_scale(&bytes, scale, Sought { prints, board, least, cells_of });
         best_of_sizes(&bytes, board, |found: &Found| &found.lattice, at_scale)
     };
     let rare = rare_prints(plate);
@@ -57,7 +59,7 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     };
     let Some(found) = found else {
         bytes.mirror();
-        if at_scale(&bytes, 1.0, &prints, board, least)?.is_some() {
+        if at_scale(&bytes, 1.0, Sought { prints: &prints, board, least, cells_of: None })?.is_some() {
             return Err(mirrored_board());
         }
         return Err(elsewhere(picture, plate).map_or_else(|| no_board(plate), |seen| other_board(plate, &seen)));
@@ -125,6 +127,18 @@ struct Found {
 }
 
 impl Found {
+    fn of(print: &Print, markers: &[Marker], lattice: Lattice, board: BoardSize) -> Self {
+        Self {
+            print: *print,
+            markers: markers.len(),
+            lattice,
+            has_place: have_place(markers),
+            has_further_row: has_further_row(markers, board),
+            rival: None,
+            has_twin: false,
+        }
+    }
+
     /// Markers that were read, then corners that are on the board: in the other layout most markers agree, moved by a column.
     fn explains(&self) -> (usize, usize) {
         (self.markers, self.lattice.len())
@@ -147,48 +161,77 @@ impl Found {
     }
 }
 
+/// What is sought.
+#[derive(Clone, Copy)]
+struct Sought<'a> {
+    prints: &'a [Print],
+    board: BoardSize,
+    /// Markers that must be read.
+    least: usize,
+    /// The picture, where cells of a lattice are read, too.
+    cells_of: Option<&'a Picture>,
+}
+
 /// The print that explains most markers in the picture at another size, with what was found.
-fn at_scale(bytes: &Bytes, scale: f64, prints: &[Print], board: BoardSize, least: usize) -> Result<Option<Found>> {
+fn at_scale(bytes: &Bytes, scale: f64, sought: Sought) -> Result<Option<Found>> {
     let scaled = bytes.scaled(scale);
     let mut corners = find_corners(&scaled);
     loop {
-        if let Some(found) = among(&corners, (&scaled, scale), prints, board, least)? {
+        let found = among(&corners, (&scaled, scale), sought)?;
+        if found.as_ref().is_some_and(|found| found.has_place && shows_most(&found.lattice, sought.board)) {
+            return Ok(found);
+        }
+        let Sorted { lattices, left } = Sorted::of(&corners, scale);
+        let on_lattice = sought.on_lattices(&lattices);
+        // Of equals that which the library found.
+        if let Some(found) = [on_lattice, found].into_iter().flatten().max_by_key(Found::explains) {
             return Ok(Some(found));
         }
-        let Some(left) = left_over(&corners) else { return Ok(None) };
+        if lattices.is_empty() {
+            return Ok(None);
+        }
         corners = left;
     }
 }
 
+impl Sought<'_> {
+    /// The board of the largest lattice on which enough markers tell where it lies.
+    fn on_lattices(self, lattices: &[Lattice]) -> Option<Found> {
+        let picture = self.cells_of?;
+        // Of a larger lattice no board is half.
+        let able = |lattice: &&Lattice| lattice.len() <= 2 * (self.board.columns * self.board.rows) as usize;
+        let mut boards = lattices.iter().filter(able).filter_map(|lattice| {
+            let on_lattice = |print| self.on_lattice(picture, lattice, print);
+            with_rival(self.prints.iter().filter_map(on_lattice).collect())
+        });
+        let mut best = boards.next()?;
+        best.has_twin = boards.any(|other| other.lattice.keys().any(|corner| best.lattice.contains_key(corner)));
+        Some(best)
+    }
+
+    fn on_lattice(self, picture: &Picture, lattice: &Lattice, print: &Print) -> Option<Found> {
+        let (placement, markers) = placed(picture, lattice, print, self.board)?;
+        let at = |(key, uv): (&(i32, i32), &[f64; 2])| (placement.board_from_lattice(*key), *uv);
+        let on_board = lattice.iter().map(at).filter(|(at, _)| self.board.contains(*at)).collect();
+        have_place(&markers).then(|| Found::of(print, &markers, on_board, self.board))
+    }
+}
+
 /// The same, of some of the corners.
-fn among(
-    corners: &[ChessCorner],
-    (scaled, scale): (&Bytes, f64),
-    prints: &[Print],
-    board: BoardSize,
-    least: usize,
-) -> Result<Option<Found>> {
-    let mut best: Option<Found> = None;
-    let mut all: Vec<(bool, (usize, usize))> = Vec::new();
+fn among(corners: &[ChessCorner], (scaled, scale): (&Bytes, f64), sought: Sought) -> Result<Option<Found>> {
+    let Sought { prints, board, least, .. } = sought;
+    let mut all: Vec<Found> = Vec::new();
     for print in prints {
         let Some(found) = decode(&scaled.view(), corners, print, board)? else { continue };
-        let markers = found.markers.len();
-        if markers < least {
+        if found.markers.len() < least {
             continue;
         }
         let place = |[x, y]: [f32; 2]| [x, y].map(|c| on_picture(c, scale));
-        let lattice: Lattice = found.corners.iter().map(|(at, px)| (*at, place(*px))).collect();
-        let has_place = have_place(&found.markers);
-        let has_further_row = has_further_row(&found.markers, board);
-        let found = Found { print: *print, markers, lattice, has_place, has_further_row, rival: None, has_twin: false };
-        all.push((print.legacy, found.explains()));
-        if best.as_ref().is_none_or(|other| other.explains() < found.explains()) {
-            best = Some(found);
-        }
+        let lattice = found.corners.iter().map(|(at, px)| (*at, place(*px))).collect();
+        all.push(Found::of(print, &found.markers, lattice, board));
     }
+    let mut best = with_rival(all);
     if let Some(best) = &mut best {
-        let rivals = all.iter().filter(|(legacy, _)| *legacy != best.print.legacy);
-        best.rival = rivals.map(|(_, explains)| *explains).max();
         let others = beside(corners, &best.lattice, scale, board);
         if 2 * others.len() >= best.lattice.len() {
             let twin = decode(&scaled.view(), &others, &best.print, board)?;
@@ -196,6 +239,16 @@ fn among(
         }
     }
     Ok(best)
+}
+
+/// The first of those that explain most.
+fn with_rival(mut all: Vec<Found>) -> Option<Found> {
+    let explains: Vec<_> = all.iter().map(|found| (found.print.legacy, found.explains())).collect();
+    let most = explains.iter().map(|(_, explains)| *explains).max()?;
+    let mut best = all.swap_remove(explains.iter().position(|(_, explains)| *explains == most)?);
+    let rivals = explains.iter().filter(|(legacy, _)| *legacy != best.print.legacy);
+    best.rival = rivals.map(|(_, explains)| *explains).max();
+    Some(best)
 }
 
 /// The corners that do not lie on the board, with its margin.

@@ -5,12 +5,10 @@
 
 use std::collections::BTreeMap;
 
+use super::charuco_cells::Cells;
 use super::charuco_markers::Print;
-use super::labels::Shader;
 use crate::detect::Picture;
 use crate::detect::corners::lattice::{BoardSize, Lattice};
-use crate::detect::tags::code::Reader;
-use crate::series::{TagPrint, Tags};
 
 /// Squares beyond the board in which markers are looked for.
 const BEYOND: i32 = 1;
@@ -18,7 +16,7 @@ const BEYOND: i32 = 1;
 const LEAST: usize = 2;
 
 /// Column and row of a square of the board.
-type Square = (i32, i32);
+pub(super) type Square = (i32, i32);
 
 /// How a board numbers its markers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -30,7 +28,7 @@ pub(super) struct Counting {
 }
 
 impl Counting {
-    fn of(print: &Print) -> Self {
+    pub fn of(print: &Print) -> Self {
         Self { first_id: print.first_id, legacy: print.legacy }
     }
 }
@@ -70,25 +68,11 @@ pub(super) fn contradiction(
 
 /// The upright markers in the light squares of the lattice.
 fn read(picture: &Picture, lattice: &Lattice, print: &Print, board: BoardSize) -> Vec<(Square, u32)> {
-    let Some(shader) = Shader::of(picture, lattice) else { return Vec::new() };
-    let dictionary = print.dictionary;
-    let tags = Tags {
-        dictionary: dictionary.name().to_owned(),
-        print: TagPrint::Opencv,
-        side_m: 1.0,
-        gap_m: 0.0,
-        first_id: 0,
-    };
-    let reader = Reader::of(&tags, &dictionary);
-    let (low, high) = (0.5 * (1.0 - print.ratio), 0.5 * (1.0 + print.ratio));
+    let Some(cells) = Cells::of(picture, lattice, print) else { return Vec::new() };
     let marker = |(column, row): Square| {
         // Corners are counted from the first inner one.
-        let cell = (column - 1, row - 1);
-        let [a, b, c, d] = [[low, low], [high, low], [high, high], [low, high]].map(|at| shader.place(cell, at));
-        let quad = [a?, b?, c?, d?];
-        let reading = reader.read(picture, &quad, false)?;
-        let [.., top_left] = reading.corners;
-        (top_left == quad[0]).then_some(((column, row), reading.id))
+        let reading = cells.read((column - 1, row - 1)).filter(|reading| reading.turns == 0)?;
+        Some(((column, row), reading.id))
     };
     let rows = -BEYOND..=board.rows + BEYOND;
     let squares = rows.flat_map(|row| (-BEYOND..=board.columns + BEYOND).map(move |column| (column, row)));
@@ -100,7 +84,7 @@ fn is_light((column, row): Square, legacy: bool) -> bool {
 }
 
 /// The number of the marker in a square; `None` where there is none.
-fn number(board: BoardSize, counting: Counting, square: Square) -> Option<u32> {
+pub(super) fn number(board: BoardSize, counting: Counting, square: Square) -> Option<u32> {
     counting.first_id.checked_add(before(board, counting.legacy, square)?)
 }
 

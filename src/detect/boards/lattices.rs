@@ -65,15 +65,15 @@ impl Lattices {
 }
 
 /// Corners of one size of the picture.
-struct Sorted {
+pub(super) struct Sorted {
     /// The largest first, in px of the picture.
-    lattices: Vec<Lattice>,
+    pub lattices: Vec<Lattice>,
     /// Corners that are on none, in px of the other size.
-    left: Vec<ChessCorner>,
+    pub left: Vec<ChessCorner>,
 }
 
 impl Sorted {
-    fn of(corners: &[ChessCorner], scale: f64) -> Self {
+    pub fn of(corners: &[ChessCorner], scale: f64) -> Self {
         let found = lattices(corners);
         let at = |c: &ChessboardCorner| [c.position.x, c.position.y].map(|px| on_picture(px, scale));
         let lattice =
@@ -91,12 +91,6 @@ impl Sorted {
 fn lattices(corners: &[ChessCorner]) -> Vec<ChessboardDetection> {
     ChessboardDetector::new(ChessboardParams::default())
         .map_or_else(|_| Vec::new(), |finder| finder.detect_all(corners))
-}
-
-/// The corners that are on no lattice; `None` where there is no lattice to leave out.
-pub(super) fn left_over(corners: &[ChessCorner]) -> Option<Vec<ChessCorner>> {
-    let found = lattices(corners);
-    (!found.is_empty()).then(|| without(corners, &found))
 }
 
 fn without(corners: &[ChessCorner], found: &[ChessboardDetection]) -> Vec<ChessCorner> {

@@ -26,12 +26,16 @@ pub(super) fn best_of_sizes<T>(
         if best.as_ref().is_none_or(|other| lattice(&found).len() > lattice(other).len()) {
             best = Some(found);
         }
-        let corners = best.as_ref().map_or(0, |b| lattice(b).len());
-        if corners as f64 >= MOST * f64::from(board.columns * board.rows) {
+        if best.as_ref().is_some_and(|best| shows_most(lattice(best), board)) {
             break;
         }
     }
     Ok(best)
+}
+
+/// Whether no other size need be tried.
+pub(super) fn shows_most(lattice: &Lattice, board: BoardSize) -> bool {
+    lattice.len() as f64 >= MOST * f64::from(board.columns * board.rows)
 }
 
 /// A place in a picture of another size; pixels are counted from their centres.

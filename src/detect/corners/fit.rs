@@ -4,6 +4,7 @@ use super::model::{
     Block, Edges, GROWTH, HALO, HALO_BLUR, LANES, LEVEL, LEVEL_SLOPE, LN_BLUR, Matrix, PARAMETERS, Prediction, STEP,
     STEP_SLOPE, THETA, Vector,
 };
+use super::neighbours::Bend;
 use super::refusal::Refusal;
 use super::smooth::Source;
 use super::sums::{RunningSums, Sum};
@@ -65,8 +66,8 @@ pub(super) struct Seed {
     pub uv: [f64; 2],
     /// Image of one square's side along each of the two edges, px.
     pub sides: [[f64; 2]; 2],
-    /// Curvature of the two edges, 1 / px: positive where they bend from the side along x towards y.
-    pub curvature: [f64; 2],
+    /// How the two edges run, where a lens may bend them.
+    pub bends: [Option<Bend>; 2],
 }
 
 impl Seed {
@@ -134,7 +135,7 @@ pub(super) fn refine(source: &Source, seed: &Seed, window: Window, look: Look) -
     let guess = start(seed, &pixels, look);
     let contrast = guess[STEP];
     let (noise, full_scale) = (START_NOISE * contrast.abs(), source.full_scale());
-    let curvature = seed.curvature;
+    let curvature = seed.bends.map(|bend| bend.map_or(0.0, |bend| bend.curvature));
     let mut problem = Problem { pixels, curvature, look, noise, contrast, full_scale, level_slope: SLOPE_PER_PX };
     let near = problem.pixels.near;
     let rough = problem.minimise(problem.at(&guess, near), near, ROUGH)?;

@@ -76,7 +76,7 @@ impl Placement {
     }
 
     /// Board coordinates (column, row) of a lattice corner, also off the board.
-    fn board_from_lattice(self, (u, v): (i32, i32)) -> (i32, i32) {
+    pub(in crate::detect) fn board_from_lattice(self, (u, v): (i32, i32)) -> (i32, i32) {
         let BoardSize { columns, rows } = self.board;
         let (a, b) = (u - self.origin.0, v - self.origin.1);
         match self.turns % 4 {

@@ -6,7 +6,7 @@
 
 use super::fit::{Look, Saddle, Seed, Window, refine};
 use super::lattice::Lattice;
-use super::neighbours::{Bend, REACH, bend, seed};
+use super::neighbours::{Bend, REACH, bend, bent_seed, is_in_line, seed};
 use super::refusal::Refusal;
 use super::smooth::Source;
 use crate::detect::Picture;
@@ -65,8 +65,9 @@ impl<'a> Sight<'a> {
     pub fn bend(&mut self, lattice: &Lattice) -> bool {
         let Window { reach, radius_px, .. } = self.window;
         // Taken for straight, an edge lies a third of its sagitta off.
-        let moved = |b: Bend| b.curvature.abs() * radius_px.min(reach * b.side_px).powi(2) / 6.0;
-        let all = lattice.keys().flat_map(|&key| [0, 1].into_iter().filter_map(move |axis| bend(lattice, key, axis)));
+        let moved = |b: Bend| b.curvature.abs() * radius_px.min(reach * b.side[0].hypot(b.side[1])).powi(2) / 6.0;
+        let both = |(&key, &uv)| [0, 1].into_iter().filter_map(move |axis| bend(lattice, key, uv, axis));
+        let all = lattice.iter().flat_map(both);
         self.is_bent = quantile(all.map(moved), BENT_SHARE).is_some_and(|moved| moved > BENT_PX);
         self.is_bent
     }
@@ -90,10 +91,27 @@ impl<'a> Sight<'a> {
         seeds.iter().filter_map(|seed| self.fit(seed).ok()).collect()
     }
 
-    /// Fits a corner.
-    pub fn fit(&self, seed: &Seed) -> Result<Saddle, Refusal> {
-        let curvature = if self.is_bent { seed.curvature } else { [0.0; 2] };
-        refine(&self.source, &Seed { curvature, ..*seed }, self.window, self.look)
+    /// Fits a corner of a lattice, or one that it lacks, by neighbours up to so many squares away.
+    pub fn corner(&self, lattice: &Lattice, key: (i32, i32), reach: i32) -> Result<Saddle, Refusal> {
+        if !self.is_bent {
+            return self.fit(&seed(lattice, key, reach).ok_or(Refusal::NoNeighbours)?);
+        }
+        let seed = bent_seed(lattice, key, reach).ok_or(Refusal::NoNeighbours)?;
+        let mut saddle = self.fit(&seed)?;
+        if !lattice.contains_key(&key) {
+            // Where it is tells how its edges run.
+            saddle = self.fit(&seed.at(lattice, key, saddle.uv))?;
+        }
+        match is_in_line(lattice, key, saddle.uv) {
+            Some(false) => Err(Refusal::OffTheLattice),
+            _ => Ok(saddle),
+        }
+    }
+
+    fn fit(&self, seed: &Seed) -> Result<Saddle, Refusal> {
+        let [x, y] = seed.bends.map(|bend| bend.filter(|_| self.is_bent));
+        let sides = [x.map_or(seed.sides[0], |bend| bend.side), y.map_or(seed.sides[1], |bend| bend.side)];
+        refine(&self.source, &Seed { sides, bends: [x, y], ..*seed }, self.window, self.look)
     }
 }
 

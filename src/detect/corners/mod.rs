@@ -19,7 +19,7 @@ pub(super) use fit::Window;
 use lattice::{Lattice, Placement};
 use look::Sight;
 pub(super) use look::quantile;
-use neighbours::{FAR_REACH, REACH, seed};
+use neighbours::{FAR_REACH, REACH};
 use noise::{correlation, covariance};
 use outline::outline;
 use refusal::Refusal;
@@ -54,9 +54,8 @@ pub(super) fn measure(picture: &Picture, lattice: &Lattice, placement: Placement
         view = view.smoothed(lattice);
         first = First::of(&view, lattice, placement);
     }
-    let measured = first.on(lattice);
-    if view.bend(&measured) {
-        first = First::of(&view, &measured, placement);
+    if view.bend(&first.places()) {
+        first = First::of(&view, &first.on(lattice), placement);
     }
     let First { fitted, retry, mut detection, .. } = first;
     let usual = Usual::of(picture, &fitted);
@@ -109,10 +108,15 @@ struct First {
 }
 
 impl First {
+    fn places(&self) -> Lattice {
+        self.fitted.iter().map(|(&key, saddle)| (key, saddle.uv)).collect()
+    }
+
     /// The lattice with the corners where they were measured.
     fn on(&self, lattice: &Lattice) -> Lattice {
-        let at = |(key, uv): (&(i32, i32), &[f64; 2])| (*key, self.fitted.get(key).map_or(*uv, |saddle| saddle.uv));
-        lattice.iter().map(at).collect()
+        let mut measured = lattice.clone();
+        measured.extend(self.places());
+        measured
     }
 
     fn of(view: &Sight, lattice: &Lattice, placement: Placement) -> Self {
@@ -122,7 +126,7 @@ impl First {
                 first.detection.dropped.push(Dropped::point(uv, "off the board"));
                 continue;
             }
-            match seed(lattice, key, REACH).ok_or(Refusal::NoNeighbours).and_then(|seed| view.fit(&seed)) {
+            match view.corner(lattice, key, REACH) {
                 Ok(saddle) => drop(first.fitted.insert(key, saddle)),
                 Err(refusal) if refusal.may_pass() => {
                     first.is_unfinished |= refusal == Refusal::NotConverged;
@@ -166,7 +170,7 @@ impl Missing<'_> {
     }
 
     fn fit(&self, known: &Lattice, key: (i32, i32), reach: i32) -> Option<Saddle> {
-        let saddle = self.view.fit(&seed(known, key, reach)?).ok()?;
+        let saddle = self.view.corner(known, key, reach).ok()?;
         self.usual.fault(key, &saddle, self.placement).is_none().then_some(saddle)
     }
 }
