@@ -63,6 +63,10 @@ struct Scored {
 
 /// Finds where the lattice lies on the board from the colours of the squares.
 pub(super) fn label(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Labelling {
+    // No placement covers half of it.
+    if lattice.len() > 2 * (board.columns * board.rows) as usize {
+        return Labelling::Contradiction;
+    }
     let reach = board.columns.max(board.rows) + 1;
     let shades = Shader::of(picture, lattice).and_then(|shader| {
         let mut shades = Shades::read(&shader, reach)?;
@@ -106,14 +110,14 @@ fn goes_on(lattice: &Lattice, placement: Placement) -> bool {
 /// Placements that cover at least half of the lattice, best first.
 fn candidates(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Vec<Scored> {
     let Some((low, high)) = bounds(lattice) else { return Vec::new() };
+    let counts = Counts::of(lattice, low, high);
     let mut all = Vec::new();
     for (turns, light_first) in board.looks() {
         let (width, height) = Placement { board, turns, light_first, origin: (0, 0) }.extent();
         for v in low.1 - height + 1..=high.1 {
             for u in low.0 - width + 1..=high.0 {
                 let placement = Placement { board, turns, light_first, origin: (u, v) };
-                let (us, vs) = (u..u + width, v..v + height);
-                let corners = lattice.keys().filter(|key| us.contains(&key.0) && vs.contains(&key.1)).count();
+                let corners = counts.within((u, v), (u + width, v + height));
                 if 2 * corners >= lattice.len() {
                     all.push(score(placement, corners, shades));
                 }
@@ -122,6 +126,37 @@ fn candidates(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Vec<Score
     }
     all.sort_by(|a, b| b.score.total_cmp(&a.score).then(b.corners.cmp(&a.corners)));
     all
+}
+
+/// How many corners of a lattice lie in a rectangle, from sums over all that begin at its least corner.
+struct Counts {
+    low: (i32, i32),
+    columns: usize,
+    rows: usize,
+    sums: Vec<usize>,
+}
+
+impl Counts {
+    fn of(lattice: &Lattice, low: (i32, i32), high: (i32, i32)) -> Self {
+        let [columns, rows] = [high.0 - low.0 + 2, high.1 - low.1 + 2].map(|n| n as usize);
+        let mut sums = vec![0; columns * rows];
+        for row in 1..rows {
+            let mut in_row = 0;
+            for column in 1..columns {
+                in_row += usize::from(lattice.contains_key(&(low.0 + column as i32 - 1, low.1 + row as i32 - 1)));
+                sums[row * columns + column] = sums[(row - 1) * columns + column] + in_row;
+            }
+        }
+        Self { low, columns, rows, sums }
+    }
+
+    /// From `first` up to before `end`.
+    fn within(&self, first: (i32, i32), end: (i32, i32)) -> usize {
+        let column = |u: i32| (u - self.low.0).clamp(0, self.columns as i32 - 1) as usize;
+        let row = |v: i32| (v - self.low.1).clamp(0, self.rows as i32 - 1) as usize;
+        let below = |u: i32, v: i32| self.sums[row(v) * self.columns + column(u)];
+        below(end.0, end.1) + below(first.0, first.1) - below(first.0, end.1) - below(end.0, first.1)
+    }
 }
 
 fn score(placement: Placement, corners: usize, shades: &Shades) -> Scored {
@@ -364,4 +399,23 @@ pub(super) fn brightness(picture: &Picture, [u, v]: [f64; 2]) -> Option<f64> {
     let (x, y) = (u.round() as usize, v.round() as usize);
     let sum: f32 = (y - 1..=y + 1).map(|j| (x - 1..=x + 1).map(|i| picture.at(i, j)).sum::<f32>()).sum();
     Some(f64::from(sum) / 9.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_in_a_rectangle_are_counted_as_one_by_one() {
+        let lattice: Lattice = (0..60).map(|k| ((k * 7 % 11 - 3, k * 5 % 13 - 9), [0.0; 2])).collect();
+        let (low, high) = bounds(&lattice).unwrap();
+        let counts = Counts::of(&lattice, low, high);
+        for (u, v) in (-8..10).flat_map(|u| (-14..6).map(move |v| (u, v))) {
+            for (width, height) in [(1, 1), (3, 2), (20, 20)] {
+                let is_in = |key: &&(i32, i32)| (u..u + width).contains(&key.0) && (v..v + height).contains(&key.1);
+                let expected = lattice.keys().filter(is_in).count();
+                assert_eq!(counts.within((u, v), (u + width, v + height)), expected, "{u} {v} {width} {height}");
+            }
+        }
+    }
 }

@@ -401,6 +401,9 @@ impl Saddle {
 
     /// Largest share of either dark square's pixels that reach a level.
     pub fn dark_share_from(&self, level: f64) -> f64 {
+        if self.problem.pixels.iter().all(|[_, _, value]| value < level) {
+            return 0.0;
+        }
         let state = &self.end.state;
         let tangents = THETA.map(|i| [state[i].cos(), state[i].sin()]);
         let (mut reached, mut all) = ([0.0; 2], [1.0_f64; 2]);
