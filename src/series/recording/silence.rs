@@ -41,18 +41,28 @@ pub(super) fn notices(
 ) -> Vec<Notice> {
     let begin = samples.iter().map(|s| s.time_ns).min().unwrap_or_default();
     let seconds = |ns: i64| ns.saturating_sub(begin) as f64 * 1e-9;
-    let lost = silences(samples, joints).into_iter().filter_map(|((from, to), silent)| {
-        let lost = images.iter().filter(|t| (from + later_ns.0..to + later_ns.1).contains(t)).count();
+    let mut lost: BTreeMap<Vec<&str>, Vec<(Span, usize)>> = BTreeMap::new();
+    for ((from, to), silent) in silences(samples, joints) {
+        let count = images.iter().filter(|t| (from + later_ns.0..to + later_ns.1).contains(t)).count();
+        if count > 0 {
+            lost.entry(silent).or_default().push(((from, to), count));
+        }
+    }
+    let notice = |(silent, lost): (Vec<&str>, Vec<(Span, usize)>)| {
+        let span = |((from, to), _): &(Span, usize)| format!("from {:.1} s to {:.1} s", seconds(*from), seconds(*to));
+        let times: Vec<String> = lost.iter().take(SHOWN).map(span).collect();
         let what = format!(
-            "no readings of {} from {:.1} s to {:.1} s after the first joint state: {lost} images of that time are not used",
+            "no readings of {} {}{} after the first joint state: {} images of {} are not used",
             silent.join(", "),
-            seconds(from),
-            seconds(to)
+            times.join(", "),
+            if lost.len() > SHOWN { ", .." } else { "" },
+            lost.iter().map(|(_, count)| count).sum::<usize>(),
+            if lost.len() > 1 { "these times" } else { "that time" }
         );
         let remedy = "find out why the publisher fell silent, and record those stops again";
-        (lost > 0).then(|| Notice::new(Code::JointSilent, recording.display(), what, remedy))
-    });
-    lost.collect()
+        Notice::new(Code::JointSilent, recording.display(), what, remedy)
+    };
+    lost.into_iter().map(notice).collect()
 }
 
 /// A joint is missing where so many of its usual steps have no sample.
@@ -195,6 +205,18 @@ mod tests {
         assert_eq!(notices(Path::new("run.mcap"), &samples, &joints, (&images[..4], earlier)).len(), 1);
         assert_eq!(notices(Path::new("run.mcap"), &samples, &joints, (&images[9..], earlier)), []);
     }
+
+    #[test]
+    fn joints_that_fall_silent_again_and_again_are_named_once() {
+        let joints = ["a".to_owned(), "b".to_owned()];
+        // Half a second of readings, two seconds of none, five times.
+        let samples: Vec<JointSample> =
+            (0..1300).filter(|k| k % 250 < 50).map(|k| sample(k, &[("a", 0.0), ("b", 0.0)], &[])).collect();
+        let images: Vec<i64> = (0..1300).step_by(50).map(|k| k * HUNDREDTH).collect();
+        let told = notices(Path::new("run.mcap"), &samples, &joints, (&images, (0, 0)));
+        assert_eq!(told.iter().map(|n| n.code).collect::<Vec<_>>(), [Code::JointSilent], "{told:?}");
+    }
+
     /// "b" is not read for a third of a second while an image is taken; half a second later nothing is recorded at all.
     #[test]
     fn images_in_the_gap_of_one_joint_are_left_out_and_others_stay() {
