@@ -4,7 +4,7 @@ use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::left_out::{
     exchanged_pictures, exchanged_readings, left_out_bodies, left_out_images, left_out_observations, many_left_out,
-    moved, shifted_measurements,
+    moved, shifted_measurements, shifted_readings,
 };
 use super::steps::{loose, pose_step};
 use super::{
@@ -162,6 +162,7 @@ pub const CHECKS: &[Check] = &[
         ..check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s))))
     },
     check("shifted_measurements", Stage::LeftOut(|a, s| found(shifted_measurements::check(a, s)))),
+    check("shifted_readings", Stage::LeftOut(|a, s| found(shifted_readings::check(a, s)))),
     check("repeated_measurements", Stage::LeftOut(|a, s| found(repeated_measurements::check(a, s)))),
     check("left_out_bodies", Stage::LeftOut(|a, s| found(left_out_bodies::check(a, s)))),
     check("measurement_scatter", Stage::Fit(|a, b, s| found(measurement_scatter::check(a, b, s)))),

@@ -21,6 +21,7 @@ use super::left_out::left_out_observations::ObservationsLeftOut;
 use super::left_out::many_left_out::ManyLeftOut;
 use super::left_out::moved::BodyMoved;
 use super::left_out::shifted_measurements::ShiftedMeasurements;
+use super::left_out::shifted_readings::ShiftedReadings;
 use super::length_standard::ContradictedLengths;
 use super::lens_not_in_ros::LensNotInRos;
 use super::marker_off::MarkerOff;
@@ -115,6 +116,7 @@ findings! {
     ReadingRatio,
     ResidualPattern,
     ShiftedMeasurements,
+    ShiftedReadings,
     SmallGain,
     TagsOff,
     ToolInPoses,

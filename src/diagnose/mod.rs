@@ -76,6 +76,7 @@ pub use left_out::left_out_observations::{ObservationsLeftOut, observations_left
 pub use left_out::many_left_out::{ManyLeftOut, many_left_out};
 pub use left_out::moved::BodyMoved;
 pub use left_out::shifted_measurements::ShiftedMeasurements;
+pub use left_out::shifted_readings::ShiftedReadings;
 pub use length_standard::{ContradictedLengths, PlateSays};
 pub use lens_not_in_ros::LensNotInRos;
 pub use lost_images::LostImages;

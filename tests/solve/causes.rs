@@ -117,6 +117,29 @@ fn a_joint_in_a_wrong_unit_or_with_a_large_part_of_another_is_refused_by_name() 
     assert_eq!((said.code, said.place.as_str()), (Code::JointInfluenced, chain.readings[5].as_str()), "{said}");
 }
 
+/// A row that was written twice behind most of the others, or lost: the images behind it are left out, and fit the readings of the next row.
+#[test]
+fn rows_that_are_shifted_in_the_smaller_part_are_named() {
+    let (chain, made) = seen(KUKA, circles(), 8);
+    for below in [true, false] {
+        let mut series = measured(&made, &chain);
+        let right: Vec<Option<Vec<f64>>> = series.stops.iter().map(|stop| stop.readings.clone()).collect();
+        let names: Vec<String> = series.stops.iter().map(|stop| stop.image.clone()).collect();
+        let n = right.len();
+        let from = n - 8;
+        for k in from..n - 1 {
+            series.stops[k].readings.clone_from(&right[if below { k - 1 } else { k + 1 }]);
+        }
+        let solution = identify(chain.clone(), &[series], &Options::default()).unwrap();
+        let found =
+            solution.findings.iter().find_map(|f| if let Finding::ShiftedReadings(s) = f { Some(s) } else { None });
+        let found = found.unwrap_or_else(|| panic!("{:?}", codes(&solution)));
+        println!("{found:?}");
+        assert!(found.below == below && found.images.contains(&names[from + 2]), "{found:?}");
+        assert!(found.images.len() >= 5 && !found.images.contains(&names[from - 2]), "{found:?}");
+    }
+}
+
 #[test]
 fn pictures_of_two_cameras_that_are_exchanged_are_named_with_their_stops() {
     for (mounts, seed) in [([CameraMount::Hand; 2], 1), ([CameraMount::Fixed; 2], 2)] {

@@ -45,7 +45,7 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedRe
 }
 
 /// Wrongly paired images from one to the one whose readings it fits, with how well, until the first is met again.
-fn circle_from(problem: &Problem, first: usize) -> Option<Vec<(usize, f64)>> {
+pub(super) fn circle_from(problem: &Problem, first: usize) -> Option<Vec<(usize, f64)>> {
     let mut circle: Vec<(usize, f64)> = Vec::new();
     let mut at = first;
     while !circle.iter().any(|&(i, _)| i == at) {
@@ -56,7 +56,8 @@ fn circle_from(problem: &Problem, first: usize) -> Option<Vec<(usize, f64)>> {
     (at == first).then_some(circle)
 }
 
-fn whose_readings_fit(problem: &Problem, image: usize) -> Option<(usize, f64)> {
+/// The image of whose readings a wrongly paired one is, and how well it fits them.
+pub(super) fn whose_readings_fit(problem: &Problem, image: usize) -> Option<(usize, f64)> {
     let image = &problem.images[image];
     let Some(ImageRejection::WronglyPaired(Mismatch::Fit { fits: Some(fits), .. })) = &image.rejected else {
         return None;

@@ -11,3 +11,4 @@ pub(super) mod left_out_observations;
 pub(super) mod many_left_out;
 pub(super) mod moved;
 pub(super) mod shifted_measurements;
+pub(super) mod shifted_readings;

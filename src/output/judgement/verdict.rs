@@ -84,7 +84,7 @@ fn of_columns(notices: &[Notice]) -> impl Iterator<Item = String> + use<> {
 /// Rows of readings that stand beside the wrong images are to be put right whatever else failed, and a better lens that could not be fitted is
 /// the likely cause of it.
 fn of_rows(record: &SolutionRecord) -> impl Iterator<Item = String> {
-    let is_cause = |code: Code| matches!(code, Code::ReadingsExchanged | Code::NotConverged);
+    let is_cause = |code: Code| matches!(code, Code::ReadingsExchanged | Code::RowsShifted | Code::NotConverged);
     let exchanged = record.findings.iter().filter(move |f| is_cause(f.code));
     exchanged.map(|f| format!("{}: {}", f.seen, f.remedy))
 }
