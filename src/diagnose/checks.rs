@@ -65,11 +65,10 @@ pub const CHECKS: &[Check] = &[
             (Finding::ImagesShifted(own), Finding::FocusChange(focus)) => own.explains_focus(focus),
             (Finding::ImagesShifted(own), Finding::Displaced(moved)) => own.looks_like(moved),
             (Finding::ImagesShifted(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
-            (Finding::Displaced(own), Finding::Displaced(other)) => {
-                other.is_by_turns() && !own.is_by_turns() && own.explains_two_places_of(&other.mounting)
-            }
             (Finding::ZeroMoved(own), Finding::LooseMounting(_)) => own.explains_two_places(),
-            (Finding::ZeroMoved(own), Finding::Displaced(other)) => other.is_by_turns() && own.explains_two_places(),
+            (Finding::ZeroMoved(own), Finding::Displaced(other)) => {
+                other.is_by_turns() && own.explains_two_places() && own.series == other.series
+            }
             (Finding::ZeroMoved(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             (Finding::Displaced(own), Finding::MeasurementsScatter(other)) => {
                 own.explains_scatter_of(&other.instrument)

@@ -37,7 +37,7 @@ impl ToldBy {
         match state.robot.chain.pose_coordinates() {
             Some(_) => Self::Poses,
             None if is_on_rail(state) => Self::LinksOnRail,
-            None if problem.plates.len() > 1 => Self::LinksAndPlates,
+            None if (0..problem.plates.len()).filter(|k| is_free(problem, *k)).count() > 1 => Self::LinksAndPlates,
             None => Self::Links,
         }
     }
@@ -304,8 +304,12 @@ impl Kind for DoubtedSize {
             }
             Self::Uneven { .. } => "measure two far markers and give [scale] in plate.toml",
         };
-        let rail = if told_by == ToldBy::LinksOnRail { OR_THE_RAIL } else { "" };
-        format!("{remedy}{rail}")
+        let others = match told_by {
+            ToldBy::LinksOnRail => OR_THE_RAIL,
+            ToldBy::LinksAndPlates => "; the other plates may be of another size as well: measure them alike",
+            _ => "",
+        };
+        format!("{remedy}{others}")
     }
 }
 
@@ -361,11 +365,14 @@ fn release(adjustment: &mut Adjustment, index: usize) {
     }
 }
 
+/// Whether the size of a plate is not held.
+fn is_free(problem: &Problem, plate: usize) -> bool {
+    problem.layout.columns[problem.layout.shapes[plate].start + SCALE].free
+}
+
 /// With sizes of plates of which nothing is known beforehand; `None` where none tells a size.
 pub(super) fn with_sizes_released(whole: &Adjustment) -> Option<Adjustment> {
-    let layout = &whole.problem.layout;
-    let is_free = |k: &usize| layout.columns[layout.shapes[*k].start + SCALE].free;
-    let plates: Vec<usize> = (0..whole.problem.plates.len()).filter(is_free).collect();
+    let plates: Vec<usize> = (0..whole.problem.plates.len()).filter(|k| is_free(&whole.problem, *k)).collect();
     (!plates.is_empty()).then(|| {
         let mut released = whole.clone();
         plates.into_iter().for_each(|k| release(&mut released, k));

@@ -156,7 +156,7 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     done.tell_what_moves(&mut program);
     let left = done.left(&program);
     let (expected, meant) = (choice.expected(&sides, &framed, &program, &done)?, choice.meant());
-    let mut findings = model_findings(args, nominal, &models, &sides)?;
+    let mut findings = model_findings(args, nominal, &models, (&sides, &choice))?;
     findings.extend(in_other_base(args, nominal, (language, &program), &controller.chain)?);
     let said = expected.as_deref().map_err(|why| why.as_str());
     findings.extend(program_findings(args, (&program, &done, &left), (said, &meant)));
@@ -300,7 +300,7 @@ fn model_findings(
     args: &CompensateArgs,
     nominal: &Path,
     models: &Models<'_>,
-    sides: &Sides,
+    (sides, choice): (&Sides, &Choice),
 ) -> Result<Vec<FileFinding>> {
     let mut findings = Vec::new();
     findings.extend(models.frames.is_none().then(|| equal(models.from, sides)).flatten());
@@ -308,8 +308,9 @@ fn model_findings(
     if sides.from.is_none() {
         findings.extend(exchanged(models.controller, nominal, sides)?);
     }
-    for side in [&sides.to].into_iter().chain(&sides.from) {
-        let record = solution(side, None)?.ok();
+    let of_sides = [(Some(&sides.to), false), (sides.from.as_ref(), true)];
+    for (side, is_taught) in of_sides.into_iter().filter_map(|(side, is_taught)| Some((side?, is_taught))) {
+        let record = solution(side, choice.recorded(is_taught))?.ok();
         findings.extend(record.and_then(|record| untrusted(&record, Weight::Gate, side.urdf.display())));
     }
     findings.extend(not_given(&sides.to, args.compensation.as_deref(), "--compensation"));

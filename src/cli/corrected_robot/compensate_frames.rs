@@ -133,6 +133,13 @@ impl Choice {
         Ok(())
     }
 
+    /// Where the solutions are with which measured frames of a side were found.
+    pub fn recorded(&self, is_taught: bool) -> Option<&Path> {
+        let Self::Measured { to, from } = self else { return None };
+        let record = if is_taught { from.as_deref() } else { Some(to.as_ref()) };
+        Some(&record?.robot.solution.path)
+    }
+
     /// What takes the place of the program's own frames.
     ///
     /// # Errors

@@ -130,11 +130,14 @@ fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
             None => expected,
         };
         let stated_here = stated.as_ref().zip(expected.map(|expected| expected.all));
+        let is_stated = stated_here.is_some();
         reasons.add(&Measured { urdf: &args.urdf, rms_m, stated: stated_here, gain }, limits);
         let judged = without.as_ref().unwrap_or(&model);
-        if reasons.misses() {
+        let is_bad = reasons.is_bad();
+        if reasons.misses() || !is_stated && rms_m > limits.displaced_m {
             reasons.findings.extend(of_another_size(judged.laid(), file, limits));
-        } else if !reasons.is_bad() {
+        }
+        if !is_bad {
             reasons.findings.extend(open(judged.laid(), stated.as_ref(), file, limits));
         }
     }

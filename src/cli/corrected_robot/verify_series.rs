@@ -157,8 +157,12 @@ fn weigh(
 /// A plate that the model contradicts: its lengths are as wrong as the size of the plate, and no image shows it.
 fn of_another_size(size: &PlateSize, model: &Model, (urdf, series): (&Path, &[MeasuredSeries])) -> Option<FileFinding> {
     let PlateSize { plate, off, .. } = size;
-    let sigma = size.sigma.hypot(model.stated.as_ref().map_or(0.0, Stated::size_sigma));
-    if off.abs() <= model.limits.plate_size_sigmas * sigma {
+    // Lengths of which nothing is stated may be off as those of robots are.
+    let stated = model.stated.as_ref().and_then(Stated::size_sigma);
+    let weight = if stated.is_some() { Weight::Gate } else { Weight::Note };
+    let sigma = size.sigma.hypot(stated.unwrap_or_default());
+    let is_off = off.abs() > model.limits.plate_size_sigmas * sigma;
+    if !is_off {
         return None;
     }
     let (readings, _) = at_images(&model.robot, series);
@@ -167,7 +171,7 @@ fn of_another_size(size: &PlateSize, model: &Model, (urdf, series): (&Path, &[Me
     let off_m = off.abs() * root_of_mean(tips.iter().map(|tip| (tip - middle).norm_squared()));
     let text = format!(
         "{plate}: for this model it is {:.3} % (+- {:.3} %) {} than its file says, so that the lengths of the model are off by that, {:.3} mm RMS at the \
-         stops, which no other figure here holds; check the size of this plate, and that of the plate from which the model was identified: measure two far \
+         stops, of which the other figures here hold a part at most; check the size of this plate, and that of the plate from which the model was identified: measure two far \
          markers of each and give [scale]",
         100.0 * off.abs(),
         100.0 * sigma,
@@ -175,7 +179,7 @@ fn of_another_size(size: &PlateSize, model: &Model, (urdf, series): (&Path, &[Me
         1e3 * off_m
     );
     let quantities = [("relative_size", *off), ("sigma", sigma), ("rms_mm", 1e3 * off_m)];
-    Some(FileFinding::new(Code::PlateSizeContradicted, Weight::Gate, urdf.display(), quantities, text))
+    Some(FileFinding::new(Code::PlateSizeContradicted, weight, urdf.display(), quantities, text))
 }
 
 /// A model that is judged with its own zeros, which do not fit: there is no figure of it, and which zeros would fit is said.
@@ -198,6 +202,7 @@ fn of_other_zeros(args: &VerifyArgs, model: &Model, seen: &Verified<'_>, other: 
     }
     let side = Side { robot: &model.robot, urdf, solution: None };
     reasons.findings.extend(model.of_other.clone());
+    reasons.findings.extend(model.stated.as_ref().and_then(|s| s.untrusted(urdf)));
     reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
     Ok(reasons)
 }

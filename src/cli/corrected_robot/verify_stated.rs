@@ -183,11 +183,11 @@ impl Stated {
         corrections::untrusted(&self.record, Weight::Note, urdf.display())
     }
 
-    /// Relative standard deviation of the size of the plates, and so of all lengths.
-    pub fn size_sigma(&self) -> f64 {
+    /// Relative standard deviation of the size of the plate that is known best, and so of all lengths; `None` without plates.
+    pub fn size_sigma(&self) -> Option<f64> {
         let FoundModel { layout, covariance, .. } = &self.found;
-        let variance = |shape: &Range<usize>| covariance[(shape.start + SCALE, shape.start + SCALE)];
-        layout.shapes.iter().map(variance).fold(0.0, f64::max).sqrt()
+        let sigma = |shape: &Range<usize>| covariance[(shape.start + SCALE, shape.start + SCALE)].sqrt();
+        layout.shapes.iter().map(sigma).min_by(f64::total_cmp)
     }
 
     /// Whether one of these files of measurements is an input of the solution, or one of these series shows an exposure of it: files of other

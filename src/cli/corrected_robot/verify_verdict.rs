@@ -192,7 +192,13 @@ impl Reasons {
             }
         }
         let is_own = self.has(Code::OwnMeasurement);
-        let doubts = [Code::StatedExceeded, Code::ModelsNotTold, Code::SolutionDiffers];
+        let doubts = [
+            Code::StatedExceeded,
+            Code::ModelsNotTold,
+            Code::SolutionDiffers,
+            Code::SolutionUntrusted,
+            Code::PlateSizeContradicted,
+        ];
         let doubt = doubts.into_iter().find(|code| self.has(*code));
         let is_doubted = doubt.is_some() || !self.doubts.is_empty();
         let is_bad = self.is_bad();

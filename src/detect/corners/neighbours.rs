@@ -10,7 +10,7 @@ pub(super) const REACH: i32 = 2;
 pub(super) const FAR_REACH: i32 = 5;
 /// Behind a lens that bends much, the next corners alone.
 const NEXT: i32 = 1;
-/// There a corner lies less than so many squares off the line of its neighbours.
+/// There a corner lies less than so many squares off the continuation of two neighbours, and less than half as many off the middle of two.
 const OFF_LINE: f64 = 0.7;
 /// A map is as good as far away where it explains so many corners to this share of a square.
 const EXPLAINED: usize = 8;

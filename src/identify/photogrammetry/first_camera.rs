@@ -153,6 +153,7 @@ fn best_start(
     best
 }
 
+/// RMS that a first camera reaches, px, with the state and the number of views from behind.
 fn try_camera(
     Adjustment { problem, state }: &Adjustment,
     camera: usize,

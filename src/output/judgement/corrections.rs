@@ -60,8 +60,9 @@ pub fn untrusted(record: &SolutionRecord, weight: Weight, subject: impl Display)
     let failed = record.findings.iter().filter(|f| f.weight == Weight::Gate);
     let codes: BTreeSet<&str> = failed.map(|f| f.code.name()).collect();
     let codes = codes.into_iter().collect::<Vec<_>>().join(", ");
+    let codes = if codes.is_empty() { codes } else { format!(" ({codes})") };
     let text = format!(
-        "the solution that it comes from is not to be trusted ({codes}), and what is wrong there is wrong here: see `robotcal show`, mend the series and identify again"
+        "the solution that it comes from is not to be trusted{codes}, and what is wrong there is wrong here: see `robotcal show`, mend the series and identify again"
     );
     let quantities = [("checks_failed", record.failed_gates.len() as f64)];
     (!record.failed_gates.is_empty())

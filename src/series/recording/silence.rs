@@ -62,7 +62,9 @@ pub(super) fn notices(
         let remedy = "find out why the publisher fell silent, and record those stops again";
         Notice::new(Code::JointSilent, recording.display(), what, remedy)
     };
-    lost.into_iter().map(notice).collect()
+    let mut in_time: Vec<_> = lost.into_iter().collect();
+    in_time.sort_by_key(|(_, lost)| lost.first().map(|(span, _)| *span));
+    in_time.into_iter().map(notice).collect()
 }
 
 /// A joint is missing where so many of its usual steps have no sample.
