@@ -4,7 +4,6 @@ use super::model::{
     Block, Edges, GROWTH, HALO, HALO_BLUR, LANES, LEVEL, LEVEL_SLOPE, LN_BLUR, Matrix, PARAMETERS, Prediction, STEP,
     STEP_SLOPE, THETA, Vector,
 };
-use super::neighbours::Bend;
 use super::refusal::Refusal;
 use super::smooth::Source;
 use super::sums::{RunningSums, Sum};
@@ -58,6 +57,15 @@ struct Descent {
     least_share: f64,
     /// What a step may still take off the mean square of the residuals over the contrast: amid symmetric pixels a corner rests at once.
     rest: f64,
+}
+
+/// How a bent edge runs through a corner.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bend {
+    /// 1 / px, positive where the edge bends from the one axis towards the other. Perspective bends no edge.
+    pub curvature: f64,
+    /// Image of a square's side along the edge, px.
+    pub side: [f64; 2],
 }
 
 /// A corner as the lattice predicts it.

@@ -4,9 +4,9 @@
 //! steeper edges was sharpened, or taken apart and put together by a codec. What such an edge looks like in its samples depends on where in
 //! a pixel it lies. Such a picture is smoothed first, which adds a known blur and takes away what lies beyond the sampling limit.
 
-use super::fit::{Look, Saddle, Seed, Window, refine};
+use super::fit::{Bend, Look, Saddle, Seed, Window, refine};
 use super::lattice::Lattice;
-use super::neighbours::{Bend, REACH, bend, bent_seed, is_in_line, seed};
+use super::neighbours::{REACH, bend, bent_seed, is_in_line, seed};
 use super::refusal::Refusal;
 use super::smooth::Source;
 use crate::detect::Picture;

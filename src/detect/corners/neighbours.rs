@@ -1,6 +1,6 @@
 //! Where a corner should be, by the corners around it.
 
-use super::fit::Seed;
+use super::fit::{Bend, Seed};
 use super::lattice::Lattice;
 use crate::geom::PlaneMap;
 
@@ -101,15 +101,6 @@ pub(super) fn is_in_line(lattice: &Lattice, (u, v): (i32, i32), uv: [f64; 2]) ->
 
 fn bends(lattice: &Lattice, key: (i32, i32), uv: [f64; 2]) -> [Option<Bend>; 2] {
     [0, 1].map(|axis| bend(lattice, key, uv, axis))
-}
-
-/// How a bent edge runs through a corner.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Bend {
-    /// 1 / px, positive where the edge bends from the one axis towards the other. Perspective bends no edge.
-    pub curvature: f64,
-    /// Image of a square's side along the edge, px.
-    pub side: [f64; 2],
 }
 
 /// The bend of the edge along an axis through a corner at this place, from three corners in a row: the middle one is that corner, where there are such.
