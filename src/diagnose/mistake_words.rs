@@ -278,7 +278,7 @@ impl Mistake {
                 "look whether {joint} moved between the stops: write its readings into joints.csv; if it stood still, check that the URDF is of this robot and size, with lengths in metres"
             ),
             MistakeKind::Lengths { constant: None, .. } => {
-                "check that the URDF is of this robot and size, with lengths in metres, and that the tip link carries the camera; zeros of parallel joints that are off against each other, as one by +90 and the next by -90 degrees, look the same: compare the robot at its zeros with the URDF".into()
+                "check that the URDF is of this robot and size, with lengths in metres, and that the tip link carries the camera; an axis that the URDF lacks, as a rail, must have stood still between the stops: else put it into the URDF and its readings into joints.csv; zeros of parallel joints that are off against each other, as one by +90 and the next by -90 degrees, look the same: compare the robot at its zeros with the URDF".into()
             }
             MistakeKind::PlateSize { .. } => {
                 "measure the plate with a ruler and correct pitch_m (of tags tag_m or marker_m) in plate.toml; if it is right, the URDF is of another size of this robot".into()

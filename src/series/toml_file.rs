@@ -105,8 +105,10 @@ fn toml_remedy(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
     let first = quoted.next().unwrap_or_default();
     if message.starts_with("unknown") {
-        return match closest_name(first, quoted) {
+        let known: Vec<&str> = quoted.collect();
+        return match closest_name(first, known.iter().copied()) {
             Some(meant) => format!("is \"{meant}\" meant?"),
+            None if message.starts_with("unknown variant") => format!("write \"{}\"", known.join("\" or \"")),
             None => "remove it or correct its name".into(),
         };
     }
@@ -114,4 +116,17 @@ fn toml_remedy(message: &str) -> String {
         return format!("add {first} = ...");
     }
     "correct the line (text stands in quotes, numbers have a decimal point)".into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_that_is_none_of_those_known_is_told_which_there_are() {
+        for (unit, meant) in [("degree", &["deg", "rad"][..]), ("degr", &["deg"])] {
+            let remedy = toml_remedy(&format!("unknown variant `{unit}`, expected `deg` or `rad`"));
+            assert!(meant.iter().all(|unit| remedy.contains(&format!("\"{unit}\""))), "{remedy}");
+        }
+    }
 }
