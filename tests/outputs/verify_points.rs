@@ -736,6 +736,9 @@ fn points_that_cannot_show_what_a_robot_misses_are_no_good_verdict() {
     assert_eq!(judged(&by_some_joints(folder.path(), &[0, 1, 2, 3, 4, 5], 0.0)), (Some(0), vec![], false));
     let (exit, said, _) = judged(&by_some_joints(folder.path(), &[0, 1, 2, 3, 4, 5], 3e-2));
     assert_eq!((exit, said), (Some(1), vec![Code::StatedExceeded]));
+    // Nor where the model misses more than is stated, by so little that it is a note.
+    let (exit, said, _) = judged(&neighbours(folder.path(), 0.006, 6e-5, false));
+    assert_eq!((exit, said), (Some(1), vec![Code::StatedExceeded, Code::PointsUndetermined]));
 }
 
 /// Of neighbouring points frame and reflector take up what two robots differ by.

@@ -178,7 +178,8 @@ fn at_scale(bytes: &Bytes, scale: f64, sought: Sought) -> Result<Option<Found>> 
     let mut corners = find_corners(&scaled);
     loop {
         let found = among(&corners, (&scaled, scale), sought)?;
-        if found.as_ref().is_some_and(|found| found.has_place && shows_most(&found.lattice, sought.board)) {
+        let is_most = |found: &Found| found.has_place && shows_most(&found.lattice, sought.board);
+        if found.as_ref().is_some_and(|found| sought.cells_of.is_none() || is_most(found)) {
             return Ok(found);
         }
         let Sorted { lattices, left } = Sorted::of(&corners, scale);
