@@ -94,7 +94,7 @@ impl Kind for ShiftedReadings {
     fn seen(&self) -> String {
         let [first, last] = self.ends();
         format!(
-            "from {first} to {last} the rows of {} are shifted by one: {} images that were left out fit the readings of the row {}, to {:.1} (mm plus mrad)",
+            "the rows of {} are shifted by one from {first} to {last}: {} images that were left out fit the readings of the row {}, to {:.1} (mm plus mrad)",
             self.table,
             self.images.len(),
             if self.below { "below" } else { "above" },
