@@ -831,6 +831,9 @@ fn usual_mistakes_in_touches_are_named() {
     for (metres, name) in [(0.0254, "inches"), (0.3048, "feet")] {
         is(named(&|t| places(t, 0..16, &|p| *p /= metres)), Code::MeasuredUnit, name);
     }
+    for (size, says) in [(1.003, "0.30"), (0.997, "closer together")] {
+        is(named(&|t| places(t, 0..16, &|p| *p *= size)), Code::LengthsContradicted, says);
+    }
     is(named(&|t| t.all[6].seen = t.all[0].seen), Code::PlaceContradicted, "t06");
     let two = |t: &mut Touches| [(6, 0), (11, 3)].iter().for_each(|(k, of)| t.all[*k].seen = t.all[*of].seen);
     for stop in ["t06", "t11"] {

@@ -173,6 +173,7 @@ const NUMERICAL: &[(&str, &str)] = &[
     ("identify/mistakes/suspects.rs ENOUGH", "samples of a median"),
     ("identify/bodies/touch_mistakes.rs FITTED", "starts of a search"),
     ("identify/bodies/touch_mistakes.rs NAMED", "how many are named"),
+    ("identify/bodies/touch_size.rs STEPS", "by which a sum of squares is differentiated"),
     ("identify/start/turns.rs MOST_MISFIT", "robust loss of a choice"),
     ("identify/start/turns.rs ROUNDS", "most iterations"),
     ("identify/start/turns.rs TOLD", "turns are a quarter apart"),

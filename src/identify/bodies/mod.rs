@@ -16,4 +16,5 @@ pub(super) mod rows_of;
 pub(super) mod start;
 pub(super) mod taken_back;
 pub(super) mod touch_mistakes;
+mod touch_size;
 mod unrelated_rows;

@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::points_start::each_place;
+use super::touch_size::{TouchSize, of_size, size_of_places};
 use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, MistakeKind, RowsOf};
 use crate::error::Code;
@@ -59,6 +60,8 @@ enum What {
     NotCarried(Vec<String>),
     /// The place of the touches at these stops, or of those at others: any of them explains as much.
     OneOf(Vec<String>),
+    /// All distances between the places.
+    Size(TouchSize),
 }
 
 impl What {
@@ -201,6 +204,7 @@ fn explained(
         let (apart, known) = with_unknown_places(touches, |touch| touch.posture >= from);
         work_moved(touches, from, &known, &closed_form(robot, &apart, given)?.1)
     });
+    let size = size_of_places(robot, touches, given, limits);
     let kinds = [
         read_otherwise(robot, touches).map(with_given).collect(),
         mirrored(robot, touches, limits).map(with_given).collect(),
@@ -209,6 +213,7 @@ fn explained(
         tools.map(with_given).collect(),
         works.map(with_given).collect(),
         not_carried(robot, touches).map(with_given).into_iter().collect(),
+        size.map(|size| with_given((of_size(touches, size.off), What::Size(size)))).into_iter().collect(),
         given.tool.map(|tool| without_tool(touches, given, tool)).into_iter().collect::<Vec<Undone>>(),
     ];
     let all: Vec<Undone> = kinds.into_iter().flat_map(|undone| nearest(robot, undone)).collect();
@@ -425,6 +430,7 @@ fn named(undone: &Undone, left: &FrameFit, touches: &Touches) -> MistakeKind {
         What::Tool { from } => tool_moved(&stop_at(*from, touches), left, touches),
         What::Work { from, moved } => work_elsewhere(&stop_at(*from, touches), moved, touches),
         What::NotCarried(joints) => stands_still(joints),
+        What::Size(size) => other_size(*size),
     };
     MistakeKind::Poses { code, what, remedy }
 }
@@ -516,6 +522,17 @@ fn stands_still(joints: &[String]) -> Words {
          which {joints} stood"
     );
     (Code::WorkNotCarried, what, remedy)
+}
+
+fn other_size(TouchSize { off, sigma }: TouchSize) -> Words {
+    let what = format!(
+        "the touched places lie {:.3} % (+- {:.3} %) {} than the robot of the solution has them",
+        100.0 * off.abs(),
+        100.0 * sigma,
+        if off > 0.0 { "further apart" } else { "closer together" }
+    );
+    let remedy = "check the places, and the size of the plate with which the robot was identified: measure two far markers, give [scale] and run `identify` again";
+    (Code::LengthsContradicted, what, remedy.to_owned())
 }
 
 fn before_or_after(from: &str) -> String {
