@@ -190,6 +190,10 @@ impl Scene {
         let step = 1.0 / FINE as f64;
         let edge = |n: usize| n as f64 * step - margin as f64 - 0.5;
         let shade = |x: f64, y: f64| self.shade(project(&inverse, self.about_middle([x, y], f64::tan)));
+        let samples: Vec<[f64; 2]> = (0..SAMPLES as u32)
+            .map(f64::from)
+            .map(|s| [(s + 0.5) / SAMPLES * step, (s * SAMPLES_STEP + 0.5) / SAMPLES % 1.0 * step])
+            .collect();
         let corners: Vec<f64> =
             (0..=h).flat_map(|y| (0..=w).map(move |x| (x, y))).map(|(x, y)| shade(edge(x), edge(y))).collect();
         let sharp: Vec<f32> = (0..w * h)
@@ -199,12 +203,8 @@ impl Scene {
                 if rim == 0.0 || rim == 4.0 {
                     return rim as f32 / 4.0;
                 }
-                let sample = |s: u32| {
-                    let across = (f64::from(s) + 0.5) / SAMPLES;
-                    let down = (f64::from(s) * SAMPLES_STEP + 0.5) / SAMPLES % 1.0;
-                    shade(edge(x) + across * step, edge(y) + down * step)
-                };
-                (0..SAMPLES as u32).map(sample).sum::<f64>() as f32 / SAMPLES as f32
+                let shades = samples.iter().map(|[across, down]| shade(edge(x) + across, edge(y) + down));
+                shades.sum::<f64>() as f32 / SAMPLES as f32
             })
             .collect();
         let blurred = blur(&sharp, w, h, self.blur * FINE as f64, margin * FINE);
@@ -265,16 +265,17 @@ fn blur(sharp: &[f32], w: usize, h: usize, sigma: f64, margin: usize) -> Vec<f32
         .map(|k| (0..FINE).filter_map(|f| kernel.get(k.checked_sub(f)?)).sum::<f32>() / total)
         .collect();
     let (width, height) = ((w - 2 * margin) / FINE, (h - 2 * margin) / FINE);
-    let rows: Vec<f32> = (0..h * width)
-        .map(|k| {
-            let start = (k / width) * w + (k % width) * FINE;
-            wide.iter().zip(&sharp[start..]).map(|(g, s)| g * s).sum()
-        })
-        .collect();
-    (0..width * height)
-        .map(|k| {
-            let start = (k / width) * FINE * width + k % width;
-            wide.iter().enumerate().map(|(i, g)| g * rows[start + i * width]).sum()
-        })
-        .collect()
+    let mut rows = vec![0.0; h * width];
+    for (row, fine) in rows.chunks_exact_mut(width).zip(sharp.chunks_exact(w)) {
+        for (i, g) in wide.iter().enumerate() {
+            row.iter_mut().zip(fine[i..].iter().step_by(FINE)).for_each(|(sum, s)| *sum += g * s);
+        }
+    }
+    let mut pixels = vec![0.0; height * width];
+    for (y, row) in pixels.chunks_exact_mut(width).enumerate() {
+        for (g, fine) in wide.iter().zip(rows[y * FINE * width..].chunks_exact(width)) {
+            row.iter_mut().zip(fine).for_each(|(sum, s)| *sum += g * s);
+        }
+    }
+    pixels
 }

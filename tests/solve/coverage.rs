@@ -12,7 +12,7 @@ use robotcal::simulate::{SimulatedSeries, WorldRequest, series};
 use robotcal::study::measured;
 use robotcal::urdf::Chain;
 
-const SEEDS: u64 = 20;
+const SEEDS: u64 = 12;
 
 /// 50 stops with typical errors: 0.3 mm, 1 mrad, offsets of 3 mrad, 0.02 mrad of joint noise, 0.05 px.
 pub fn world(chain: &Chain, seed: u64) -> SimulatedSeries {
