@@ -60,7 +60,7 @@ impl Kind for ComputedPostures {
         };
         let open = match self.is_open {
             true => {
-                "; other postures at many stops together (a wrist turned over) fit as well: the corrected robot is right for those that were taken"
+                "; other postures at many stops together (a wrist turned over) fit as well: the corrected robot is right for those that were taken, and where the poses are of the flange in the base"
             }
             false => "",
         };
