@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::choose::{Demand, Plan, PlanRequest};
+use super::choose::{Choice, Demand, Plan, PlanRequest};
 use crate::assess::root_of_mean;
 use crate::error::{Code, Error, Result};
 use crate::linalg::SymmetricFactor;
@@ -126,14 +126,18 @@ pub fn flange_m(weight: &DMatrix<f64>, covariance: &DMatrix<f64>) -> f64 {
     weight.dot(covariance).max(0.0).sqrt()
 }
 
+impl Choice {
+    /// A candidate as a stop with this image; `None` where it sees no marker.
+    pub(super) fn stop(&self, setting: &Setting, candidate: usize, image: &str) -> Option<PlannedStop> {
+        let c = &self.pool[candidate];
+        setting.stop(&self.adjustment.state, image, &c.readings, c.placement)
+    }
+}
+
 impl Plan {
     /// Planned stops (indices into the legs).
     fn stops(&self, setting: &Setting, legs: impl Iterator<Item = usize>) -> Vec<PlannedStop> {
-        let stop = |k: usize| {
-            let c = &self.pool[self.legs[k].stop];
-            setting.stop(&self.adjustment.state, &image_name(k), &c.readings, c.placement)
-        };
-        legs.filter_map(stop).collect()
+        legs.filter_map(|k| self.stop(setting, self.legs[k].stop, &image_name(k))).collect()
     }
 }
 
@@ -162,8 +166,7 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
             let mut stops = request.taken.clone();
             stops.extend((0..count).filter_map(|k| {
                 let shift = draw as f64 / RANDOM_DRAWS as f64;
-                let c = &plan.pool[((k as f64 + shift) * step) as usize];
-                setting.stop(&plan.adjustment.state, "", &c.readings, c.placement)
+                plan.stop(setting, ((k as f64 + shift) * step) as usize, "")
             }));
             let covariance = exact_covariance(&plan.adjustment, setting, stops).ok()?;
             Some(flange_m(&plan.weight, &covariance).powi(2))

@@ -3,9 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::choose::{Choice, PlanRequest, criterion};
-use super::forecast::{KNOWN_SHARE, flange_m};
+use super::forecast::{KNOWN_SHARE, exact_covariance, flange_m};
 use crate::error::Result;
-use crate::linalg::SymmetricFactor;
 use crate::plan::relax::Design;
 use crate::plan::rounding::round;
 
@@ -32,10 +31,10 @@ pub struct PlaceForecast {
 pub fn compare_places(request: &PlanRequest, choice: &Choice) -> Result<Vec<PlaceForecast>> {
     let criterion =
         choice.identified.criterion(&criterion(&request.demand, &choice.adjustment.problem.layout, &choice.weight)?);
+    let setting = &request.setting;
     let one = |(placement, (name, _)): (usize, &(String, crate::geom::Pose))| {
-        let drawn = choice.pool.iter().zip(&choice.information).take(choice.drawn);
-        let here = drawn.filter(|(c, _)| c.placement == placement);
-        let candidates: Vec<DMatrix<f64>> = here.map(|(_, m)| m.clone()).collect();
+        let here: Vec<usize> = (0..choice.drawn).filter(|&k| choice.pool[k].placement == placement).collect();
+        let candidates: Vec<DMatrix<f64>> = here.iter().map(|&k| choice.information[k].clone()).collect();
         let design = Design {
             known: &choice.known,
             candidates: &candidates,
@@ -45,8 +44,9 @@ pub fn compare_places(request: &PlanRequest, choice: &Choice) -> Result<Vec<Plac
         };
         let chosen = design.relax().ok().and_then(|r| round(&design, &r)).map(|r| r.chosen);
         let covariance = chosen.and_then(|chosen| {
-            let m = chosen.iter().fold(choice.known.clone(), |m, &k| m + &candidates[k]);
-            SymmetricFactor::new(&m).ok().map(|f| choice.identified.covariance(&f.inverse()))
+            let planned = chosen.iter().filter_map(|&k| choice.stop(setting, here[k], ""));
+            let stops = request.taken.iter().cloned().chain(planned).collect();
+            exact_covariance(&choice.adjustment, setting, stops).ok()
         });
         PlaceForecast {
             placement,
@@ -56,7 +56,7 @@ pub fn compare_places(request: &PlanRequest, choice: &Choice) -> Result<Vec<Plac
             known: covariance.as_ref().map_or(Vec::new(), |c| known(choice, c)),
         }
     };
-    Ok(request.setting.placements.iter().enumerate().map(one).collect())
+    Ok(setting.placements.iter().enumerate().map(one).collect())
 }
 
 fn known(choice: &Choice, covariance: &DMatrix<f64>) -> Vec<String> {

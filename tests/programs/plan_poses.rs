@@ -17,7 +17,7 @@ use robotcal::plan::criterion::Criterion;
 use robotcal::plan::information::stop_information;
 use robotcal::plan::scene::{Capsule, Scene, SceneOptions};
 use robotcal::plan::setting::{Beside, PlannedStop, Setting};
-use robotcal::plan::{Budget, Choice, Demand, Plan, PlanRequest, choose, forecast, plan};
+use robotcal::plan::{Budget, Choice, Demand, Plan, PlanRequest, choose, compare_places, forecast, plan};
 use robotcal::problem::Image;
 use robotcal::series::{CameraMount, Plate, PlateKind};
 use robotcal::urdf::{Chain, JointKind};
@@ -224,6 +224,10 @@ fn every_planned_pose_is_inside_limits_sees_enough_and_touches_nothing() {
             forecast.curve.windows(2).all(|w| w[1].planned_m <= w[0].planned_m * 1.0001),
             "more images cannot hurt"
         );
+        // Its one place by itself is the same, but for what the search found.
+        let alone_m = compare_places(&request, &plan).unwrap()[0].flange_m.unwrap();
+        println!("{name}: {alone_m} {}", forecast.flange_m);
+        assert!((0.99..1.2).contains(&(alone_m / forecast.flange_m)), "{name}: {alone_m} {}", forecast.flange_m);
     }
 }
 
