@@ -66,6 +66,11 @@ limits! {
     joint_noise: f64 = 2e-3;
     /// Joint noise that no robot in order has, rad or m: two to five times what was found of real ones.
     unusual_joint_noise: f64 = 5e-4;
+    /// Times the joint noise of the quietest other series of the robot from which one is noisier: series of one robot in order are alike to a factor
+    /// of two.
+    times_quieter_noise: f64 = 4.0;
+    /// Joint noise from which that is said, rad or m: robots repeat to some 0.1 mrad.
+    noisier_from: f64 = 1e-4;
     /// Held-out error over what the joint noise does to the flange, below which the hold-out contradicts it: of fifteen stops, either is known to a
     /// fifth.
     held_out_of_noise: f64 = 0.5;

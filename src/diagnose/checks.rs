@@ -59,6 +59,8 @@ pub const CHECKS: &[Check] = &[
         explains: |own, other| match (own, other) {
             (Finding::Displaced(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::Displaced(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
+            (Finding::Displaced(own), Finding::JointNoiseLarge(noise)) => noise.is_of_what_moved_in(&own.series),
+            (Finding::Displaced(own), Finding::DoubtedSize(size)) => own.explains_size(size),
             (Finding::FocusChange(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::FocusChange(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             (Finding::ImagesShifted(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
@@ -70,6 +72,7 @@ pub const CHECKS: &[Check] = &[
                 other.is_by_turns() && own.explains_two_places() && own.series == other.series
             }
             (Finding::ZeroMoved(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
+            (Finding::ZeroMoved(own), Finding::JointNoiseLarge(noise)) => noise.is_of_what_moved_in(&own.series),
             (Finding::Displaced(own), Finding::MeasurementsScatter(other)) => {
                 own.explains_scatter_of(&other.instrument)
             }
@@ -185,6 +188,7 @@ pub const CHECKS: &[Check] = &[
     Check {
         explains: |own, other| match (own, other) {
             (Finding::ContradictedLengths(own), Finding::DoubtedSize(plate)) => own.explains(plate),
+            (Finding::ContradictedLengths(own), Finding::Displaced(moved)) => own.explains_move(moved),
             (Finding::ContradictedLengths(own), Finding::ContradictedDistances(other)) => {
                 own.instrument.is_none() && other.weight == Weight::Note
             }

@@ -40,6 +40,8 @@ pub struct JointNoiseLarge {
     pub badly_seen: Vec<ImageValue>,
     /// Stops at which that joint reads the same.
     pub stands_still: Option<StandsStill>,
+    /// The quietest of the other series of the robot and its noise, rad or m, where this one is far noisier.
+    pub quieter: Option<(String, f64)>,
     /// Whether images tell of it; else trackers and contacts do.
     pub by_images: bool,
     /// Whether the readings were computed from poses of a controller.
@@ -52,16 +54,18 @@ pub struct JointNoiseLarge {
 
 pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> Vec<JointNoiseLarge> {
     let limits = setting.limits;
+    let noise_found = setting.with_noise_found(fit);
     let of_series = |(k, of): (usize, &crate::problem::MeasuredSeries)| {
-        let (reading, joint, sigma) = noisiest_joint(setting.with_noise_found(fit), k)?;
+        let (reading, joint, sigma) = noisiest_joint(noise_found, k)?;
+        let quieter = quieter_series(noise_found, setting, (k, sigma));
         let kind = fit.state.robot.chain.reading_kinds[reading];
         let readings_are_computed = of.readings_are_computed();
         let weight = match sigma {
             s if s > limits.joint_noise => Weight::Gate,
             // Then they are not those that the robot had.
             s if s >= limits.unusual_joint_noise && readings_are_computed => Weight::Gate,
-            s if s >= limits.unusual_joint_noise
-                && is_told(setting.with_noise_found(fit), (k, reading), accuracy, limits) =>
+            s if (s >= limits.unusual_joint_noise || quieter.is_some())
+                && is_told(noise_found, (k, reading), accuracy, limits) =>
             {
                 Weight::Note
             }
@@ -81,6 +85,7 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
             worst_predicted: standing_out(problem, k, errors, limits.times_usual_error),
             badly_seen: standing_out(problem, k, sigma_px, limits.times_usual_blur),
             stands_still: stands_still(of, reading, limits.moved_images),
+            quieter,
             by_images: problem.used_on_robot().any(|i| problem.images[i].series == k),
             readings_are_computed,
             readings_are_poses: fit.state.robot.chain.pose_coordinates().is_some(),
@@ -88,6 +93,15 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
         })
     };
     setting.series.iter().enumerate().filter(|(k, _)| says_noise_first(fit, *k)).filter_map(of_series).collect()
+}
+
+/// The quietest other series of the robot, where one with this noise is far noisier.
+fn quieter_series(fit: &Fit, setting: &CheckContext, (series, sigma): (usize, f64)) -> Option<(String, f64)> {
+    let limits = setting.limits;
+    let is_other = |other: &usize| fit.problem.noise_of(*other) != fit.problem.noise_of(series);
+    let of = |other: usize| Some((setting.series[other].name.clone(), noisiest_joint(fit, other)?.2));
+    let quietest = (0..setting.series.len()).filter(is_other).filter_map(of).min_by(|a, b| a.1.total_cmp(&b.1));
+    quietest.filter(|(_, quiet)| sigma >= limits.noisier_from && sigma > limits.times_quieter_noise * quiet)
 }
 
 /// False where bodies alone tell of the noise and leave open whether there is any of this joint, as where several joints explain the same errors, or where
@@ -135,6 +149,25 @@ fn in_words(what: &str, images: &[ImageValue], shown: impl Fn(f64) -> String) ->
     if named.is_empty() { String::new() } else { format!("{what} {}", some_of(&named, MOST_IMAGES)) }
 }
 
+impl JointNoiseLarge {
+    /// True where what moved in this series is why it is noisier than others of the robot.
+    pub(super) fn is_of_what_moved_in(&self, series: &str) -> bool {
+        self.quieter.is_some() && self.series == series
+    }
+
+    /// What robots repeat to, or the other series of this one.
+    fn usual(&self) -> String {
+        let unit = self.kind.units()[1];
+        match &self.quieter {
+            Some((name, sigma)) => format!("in series {name} this robot repeats to {:.2} {unit}", 1e3 * sigma),
+            None => format!(
+                "{} repeat to some 0.1 {unit}",
+                if self.kind == JointKind::Prismatic { "rails" } else { "robots" }
+            ),
+        }
+    }
+}
+
 impl Kind for JointNoiseLarge {
     fn code(&self) -> Code {
         Code::JointNoiseLarge
@@ -177,10 +210,10 @@ impl Kind for JointNoiseLarge {
         }
         let still = self.stands_still.as_ref().map_or_else(String::new, |still| format!(", which reads {still}"));
         format!(
-            "the joint noise is {:.2} {unit} ({} most{still}), where {} repeat to some 0.1 {unit}{}{}",
+            "the joint noise is {:.2} {unit} ({} most{still}), where {}{}{}",
             1e3 * self.sigma,
             self.joint,
-            if self.kind == JointKind::Prismatic { "rails" } else { "robots" },
+            self.usual(),
             in_words(", the others predict worst", &self.worst_predicted, |mm| format!("{mm:.1} mm")),
             in_words(", blurred or badly seen", &self.badly_seen, |px| format!("sigma {px:.3} px"))
         )

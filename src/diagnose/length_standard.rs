@@ -3,6 +3,7 @@
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use super::plate_size::{DoubtedSize, with_sizes_released};
 use super::rail::{OR_THE_RAIL, is_on_rail, with_gears_released};
+use super::steps::displaced::Displaced;
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
@@ -48,6 +49,11 @@ impl ContradictedLengths {
     /// True where the size of a plate is doubted because of it.
     pub(super) fn explains(&self, other: &DoubtedSize) -> bool {
         self.plate != PlateSays::Nothing && matches!(other, DoubtedSize::Contradicted { .. })
+    }
+
+    /// True where what it measures seems to stand elsewhere, by a distance that is hardly told.
+    pub(super) fn explains_move(&self, moved: &Displaced) -> bool {
+        self.instrument.as_ref() == Some(&moved.mounting) && !moved.is_far()
     }
 }
 
