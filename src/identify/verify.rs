@@ -9,7 +9,7 @@ use super::start::turns;
 use super::start::zeros::other_zeros;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
-use crate::diagnose::{PlateSize, ZeroOff, sizes_by_robot, zeros_off};
+use crate::diagnose::{SizeDifference, ZeroOff, sizes_by_robot, zeros_off};
 use crate::error::{Code, Error, Result};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries};
@@ -52,8 +52,8 @@ impl JudgedSeries {
 pub struct JudgedByImages {
     /// The error of each.
     pub images: Vec<JudgedImage>,
-    /// How large the plates are for this robot: no error of an image holds what all its lengths are off by.
-    pub sizes: Vec<PlateSize>,
+    /// How large the plates are for this robot, by their names: no error of an image holds what all its lengths are off by.
+    pub sizes: Vec<(String, SizeDifference)>,
 }
 
 /// A robot with other zeros than those of the one that is judged.

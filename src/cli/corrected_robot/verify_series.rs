@@ -17,7 +17,7 @@ use crate::cli::Verdict;
 use crate::cli::flags::recording::RecordingArgs;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::say::say_line;
-use crate::diagnose::{Finding, PlateSize, Weight};
+use crate::diagnose::{Finding, SizeDifference, Weight};
 use crate::error::{Code, Error, Result};
 use crate::identify::{
     JudgedByImages, JudgedImage, JudgedSeries, Options, RobotModel, RobotOfOtherZeros, Selection, identify,
@@ -127,7 +127,7 @@ struct Verified<'a> {
 fn weigh(
     args: &VerifyArgs,
     model: &Model,
-    (seen, images, sizes): (&Verified<'_>, &[&JudgedImage], &[PlateSize]),
+    (seen, images, sizes): (&Verified<'_>, &[&JudgedImage], &[(String, SizeDifference)]),
     gain: Option<Gain<'_>>,
 ) -> Reasons {
     let Model { robot, stated, of_other, limits } = model;
@@ -155,12 +155,15 @@ fn weigh(
 }
 
 /// A plate that the model contradicts: its lengths are as wrong as the size of the plate, and no image shows it.
-fn of_another_size(size: &PlateSize, model: &Model, (urdf, series): (&Path, &[MeasuredSeries])) -> Option<FileFinding> {
-    let PlateSize { plate, off, .. } = size;
+fn of_another_size(
+    (plate, SizeDifference { off, sigma }): &(String, SizeDifference),
+    model: &Model,
+    (urdf, series): (&Path, &[MeasuredSeries]),
+) -> Option<FileFinding> {
     // Lengths of which nothing is stated may be off as those of robots are.
     let stated = model.stated.as_ref().and_then(Stated::size_sigma);
     let weight = if stated.is_some() { Weight::Gate } else { Weight::Note };
-    let sigma = size.sigma.hypot(stated.unwrap_or_default());
+    let sigma = sigma.hypot(stated.unwrap_or_default());
     let is_off = off.abs() > model.limits.plate_size_sigmas * sigma;
     if !is_off {
         return None;
