@@ -20,8 +20,8 @@ use crate::cli::terminal::say::say_line;
 use crate::diagnose::{Finding, SizeDifference, Weight};
 use crate::error::{Code, Error, Result};
 use crate::identify::{
-    JudgedByImages, JudgedImage, JudgedSeries, Options, RobotModel, RobotOfOtherZeros, Selection, identify,
-    in_told_postures, postures_are_computed, verify_series,
+    JudgedImage, JudgedSeries, Options, RobotModel, RobotOfOtherZeros, Selection, identify, in_told_postures,
+    postures_are_computed, verify_series,
 };
 use crate::model::robot::Robot;
 use crate::output::compensated;
@@ -45,13 +45,13 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
         let zeros = zeros(args, &model, &files)?;
         let seen =
             Verified { series: &with_added(series, &missing(zeros.as_ref())), files: &files, zeros: zeros.as_ref() };
-        let JudgedByImages { images, sizes } = match judged((&model.robot, &args.urdf), seen.series, &model.limits)? {
-            JudgedSeries::Images(judged) => judged,
+        let found = match judged((&model.robot, &args.urdf), seen.series, &model.limits)? {
+            JudgedSeries::Images(found) => found,
             JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
         };
-        let images: Vec<&JudgedImage> = images.iter().collect();
+        let images: Vec<&JudgedImage> = found.images.iter().collect();
         say_line!("{}", line("model", &args.urdf, &images));
-        return Ok(weigh(args, &model, (&seen, &images, &sizes), None).verdict());
+        return Ok(weigh(args, &model, (&seen, &images, &found.plate_sizes()), None).verdict());
     };
     // Poses of a controller are those of the model that is in it, whichever robot is judged by them.
     let nominal_inputs = read(file)?;
@@ -63,17 +63,17 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let missing = missing(zeros.as_ref());
     let series = in_told_postures(&model.robot, &with_added(series, &missing), &model.limits);
     let seen = Verified { series: &series, files: &files, zeros: zeros.as_ref() };
-    let JudgedByImages { images, sizes } = match judged((&model.robot, &args.urdf), &series, &model.limits)? {
-        JudgedSeries::Images(judged) => judged,
+    let found = match judged((&model.robot, &args.urdf), &series, &model.limits)? {
+        JudgedSeries::Images(found) => found,
         JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
     };
     let as_shown: Vec<f64> = missing.iter().map(|offset| -offset).collect();
     let (robot, nominal) =
         compared((Robot::nominal(chain), file), &with_added(series.clone(), &as_shown), &model.limits)?;
-    let (images, nominal) = of_both(&images, &nominal);
+    let (images, nominal) = of_both(&found.images, &nominal);
     let ratio = compare(args, file, &images, &nominal)?;
     let gain = Gain { ratio, nominal: &robot, of: "images", at: at_images(&model.robot, &series) };
-    Ok(weigh(args, &model, (&seen, &images, &sizes), Some(gain)).verdict())
+    Ok(weigh(args, &model, (&seen, &images, &found.plate_sizes()), Some(gain)).verdict())
 }
 
 /// What is judged, with what its solution states and the limits with which that was found.
