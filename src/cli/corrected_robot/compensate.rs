@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
-use super::compensate_frames::{Choice, Side, Sides, known_error, solution};
+use super::compensate_frames::{Choice, Side, Sides, Solutions, known_error};
 use super::compensate_models::{corrected_already, equal, exchanged, not_given};
 use super::controller_base::controller_base;
 use crate::cli::Verdict;
@@ -143,8 +143,9 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
         program.heed_no_codes();
     }
     let choice = Choice::read(args.frames.as_deref(), args.from_frames.as_deref(), &sides)?;
-    let framed = choice.framed(&sides)?;
-    let frames = choice.measured(&sides, language, &setting)?;
+    let solutions = choice.solutions(&sides)?;
+    let framed = choice.framed(&solutions)?;
+    let frames = choice.measured(&solutions, language, &setting)?;
     let models = Models {
         controller,
         from: robots.from.as_ref().unwrap_or(controller),
@@ -155,8 +156,8 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     let done = programs::compensate(&program, models, &postures(args, &controller.chain, &axes)?);
     done.tell_what_moves(&mut program);
     let left = done.left(&program);
-    let (expected, meant) = (choice.expected(&sides, &framed, &program, &done)?, choice.meant());
-    let mut findings = model_findings(args, nominal, &models, (&sides, &choice))?;
+    let (expected, meant) = (choice.expected((&sides, &solutions), &framed, &program, &done)?, choice.meant());
+    let mut findings = model_findings(args, nominal, &models, (&sides, &solutions))?;
     findings.extend(in_other_base(args, nominal, (language, &program), &controller.chain)?);
     let said = expected.as_deref().map_err(|why| why.as_str());
     findings.extend(program_findings(args, (&program, &done, &left), (said, &meant)));
@@ -300,7 +301,7 @@ fn model_findings(
     args: &CompensateArgs,
     nominal: &Path,
     models: &Models<'_>,
-    (sides, choice): (&Sides, &Choice),
+    (sides, solutions): (&Sides, &Solutions),
 ) -> Result<Vec<FileFinding>> {
     let mut findings = Vec::new();
     findings.extend(models.frames.is_none().then(|| equal(models.from, sides)).flatten());
@@ -308,10 +309,10 @@ fn model_findings(
     if sides.from.is_none() {
         findings.extend(exchanged(models.controller, nominal, sides)?);
     }
-    let of_sides = [(Some(&sides.to), false), (sides.from.as_ref(), true)];
-    for (side, is_taught) in of_sides.into_iter().filter_map(|(side, is_taught)| Some((side?, is_taught))) {
-        let record = solution(side, choice.recorded(is_taught))?.ok();
-        findings.extend(record.and_then(|record| untrusted(&record, Weight::Gate, side.urdf.display())));
+    let of_sides = [(Some(&sides.to), Some(&solutions.to)), (sides.from.as_ref(), solutions.from.as_ref())];
+    for (side, found) in of_sides.into_iter().filter_map(|(side, found)| side.zip(found)) {
+        let record = found.as_ref().ok();
+        findings.extend(record.and_then(|record| untrusted(record, Weight::Gate, side.urdf.display())));
     }
     findings.extend(not_given(&sides.to, args.compensation.as_deref(), "--compensation"));
     let taught = sides.from.as_ref();
