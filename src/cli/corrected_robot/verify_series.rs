@@ -138,7 +138,7 @@ fn weigh(
     reasons
 }
 
-/// A plate that the model contradicts: its lengths are as wrong as the size of the plate, and no image shows it.
+/// A plate that the model contradicts: its lengths are as wrong as the size of the plate, and the errors of the images hold a part of that at most.
 fn of_another_size(
     (plate, SizeDifference { off, sigma }): &(String, SizeDifference),
     model: &Model,
