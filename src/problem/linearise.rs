@@ -200,7 +200,7 @@ fn whitened(
 }
 
 /// An observation in use.
-struct Seen {
+struct UsedObservation {
     marker: usize,
     /// Derivative of its prediction by the modes of the plate.
     by_modes: SMatrix<f64, MODES, 2>,
@@ -218,7 +218,7 @@ fn each_seen(
     state: &State,
     pose: &Pose,
     weighting: &Weighting,
-    mut tell: impl FnMut(&Prediction, &Seen),
+    mut tell: impl FnMut(&Prediction, &UsedObservation),
 ) -> Option<()> {
     let (plate, camera) = (&state.plates[image.plate], &state.cameras[image.camera]);
     let precision = 1.0 / weighting.pixel_factor;
@@ -236,7 +236,7 @@ fn each_seen(
         let (cost, weight) = weighting.huber(normalised);
         let root = if weight < 1.0 { root * weight.sqrt() } else { root };
         let residual = Residual { observation, duv, normalised, weight };
-        tell(&p, &Seen { marker: o.marker, by_modes, residual, cost, root });
+        tell(&p, &UsedObservation { marker: o.marker, by_modes, residual, cost, root });
     }
     Some(())
 }

@@ -8,7 +8,7 @@ use calib_targets_chessboard::ChessCorner;
 use super::charuco_markers::{Marker, Print, decode, prints, rare_prints};
 use super::charuco_numbers::{Contradiction, Counting, contradiction};
 use super::charuco_placed::placed;
-use super::charuco_seen::{Seen, elsewhere, ids, instead, side_seen};
+use super::charuco_seen::{MarkersSeen, elsewhere, ids, instead, side_seen};
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
 use super::lattices::Sorted;
@@ -307,7 +307,7 @@ fn no_board(plate: &Plate) -> Error {
     Error::new(Code::PlateNotFound, "image", not_found(plate), remedy)
 }
 
-fn other_board(plate: &Plate, seen: &Seen) -> Error {
+fn other_board(plate: &Plate, seen: &MarkersSeen) -> Error {
     let mut differs = Vec::new();
     if seen.dictionary_differs(plate) {
         differs.push(format!("the markers are those of {}", seen.dictionary));

@@ -38,7 +38,7 @@ impl OddPart {
     }
 
     /// Adds the products of every two values, times `scale`.
-    pub fn add_to(&self, seen: &mut Seen, scale: f64) {
+    pub fn add_to(&self, seen: &mut LagProducts, scale: f64) {
         let raster = Raster::new(&self.odd.at);
         raster.add_products(&mut seen.products, scale, &raster.plane(|k| self.odd.values[k]));
         raster.add_products(&mut seen.counts, 1.0, &raster.plane(|_| 1.0));
@@ -53,14 +53,14 @@ impl OddPart {
 
 /// Sums over the pairs of pixels at every lag.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::detect) struct Seen {
+pub(in crate::detect) struct LagProducts {
     /// Products of residuals.
     pub products: [f64; LAGS],
     /// How many.
     pub counts: [f64; LAGS],
 }
 
-impl Seen {
+impl LagProducts {
     pub const NOTHING: Self = Self { products: [0.0; LAGS], counts: [0.0; LAGS] };
 
     /// Adds those of other pixels.
