@@ -60,20 +60,10 @@ pub(super) fn mistake(
         given = some_of(given.len()).map(|k| given[k].at(given[k].readings.clone())).collect();
     }
     let as_described = misfit(robot, &given);
-    let readings: Vec<Vec<f64>> = given.iter().map(|s| s.readings.clone()).collect();
-    let read_otherwise = all_misread().filter_map(|misread| {
-        let undone = |s: &SeenAt| Some(SeenAt { seen: misread.undone(s.seen)?, ..s.at(s.readings.clone()) });
-        Some((given.iter().map(undone).collect::<Option<Vec<_>>>()?, misread.kind()))
-    });
-    let signs = mirrored_signs_undone(robot, &readings, limits.suspicious_misfit);
-    let of_columns = columns_undone(robot, &readings).into_iter().chain(signs).map(|(readings, kind)| {
-        let undone = given.iter().zip(readings).map(|(s, readings)| s.at(readings));
-        (undone.collect(), kind)
-    });
-    let undone = read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, (&given, stops)));
     let instrument = &problem.instruments[given[0].instrument];
     let in_sockets = instrument.kind == InstrumentKind::Socket;
-    let undone: Vec<Undone> = undone.filter(|(_, kind)| !hardly_moves(kind) || is_suspicious).collect();
+    let mut undone = all_undone(problem, robot, (&given, stops), limits);
+    undone.retain(|(_, kind)| !hardly_moves(kind) || is_suspicious);
     // In sockets an arm that hardly moves fits without a cause: what is left counts by how far the tip moves.
     let slower = undone.iter().find(|(_, kind)| in_sockets && hardly_moves(kind));
     let slower = slower.map_or(1.0, |(undone, _)| tip_moves(robot, &given) / tip_moves(robot, undone));
@@ -95,6 +85,27 @@ pub(super) fn mistake(
     };
     let rows_of = rows_of_bodies(adjustment, measured, limits);
     Some(Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of })
+}
+
+/// What was seen with each of the usual mistakes undone: of what the instrument wrote, of columns and signs, and of the rows of stops at which something
+/// was `measured`.
+fn all_undone(
+    problem: &Problem,
+    robot: &Robot,
+    (given, measured): (&[SeenAt], Vec<usize>),
+    limits: &Limits,
+) -> Vec<Undone> {
+    let readings: Vec<Vec<f64>> = given.iter().map(|s| s.readings.clone()).collect();
+    let read_otherwise = all_misread().filter_map(|misread| {
+        let undone = |s: &SeenAt| Some(SeenAt { seen: misread.undone(s.seen)?, ..s.at(s.readings.clone()) });
+        Some((given.iter().map(undone).collect::<Option<Vec<_>>>()?, misread.kind()))
+    });
+    let signs = mirrored_signs_undone(robot, &readings, limits.suspicious_misfit);
+    let of_columns = columns_undone(robot, &readings).into_iter().chain(signs).map(|(readings, kind)| {
+        let undone = given.iter().zip(readings).map(|(s, readings)| s.at(readings));
+        (undone.collect(), kind)
+    });
+    read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, (given, measured))).collect()
 }
 
 /// True for a mistake without which the arm hardly moves: places that hardly differ do not tell it from one that turns about them.
