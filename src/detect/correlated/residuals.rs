@@ -8,6 +8,7 @@ use super::raster::{LAGS, NONE, Raster};
 pub(in crate::detect) struct Residuals {
     /// Column and row of every pixel.
     pub at: Vec<[i32; 2]>,
+    /// Of every pixel: counts, or in units of the noise, as the fit has them.
     pub values: Vec<f64>,
     /// Columns `U`, a value a pixel: `U U'` has the derivatives of fitted values by pixel values.
     pub followed: Vec<Vec<f64>>,
