@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3x6, SMatrix, Vector3};
 use super::flange::everywhere;
 use super::mean_square::MeanSquare;
 use crate::geom::{Pose, rigid_fit, skew};
-use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
+use crate::linalg::{SymmetricFactor, dense, product, symmetric_eigen};
 use crate::model::robot::{Posture, Robot};
 use crate::solve::Spread;
 
@@ -309,6 +309,6 @@ impl PointFit {
             by_noise.fixed_view_mut::<3, 1>(0, r).copy_from(&(moved * d * *sigma));
         }
         let by = by_frame_and_reflector(&self.device_from_base, &tip, &self.tip_point_m);
-        Derivatives { by_model, by_noise, fitted: DMatrix::from_column_slice(3, FITTED, by.as_slice()) }
+        Derivatives { by_model, by_noise, fitted: dense(&by) }
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::geom::skew;
-use crate::linalg::product;
+use crate::linalg::{dense, product};
 use crate::model::camera::{Camera, MAX_PARAMETERS};
 
 /// Places of the map across the image.
@@ -115,8 +115,7 @@ fn without_turn(jacobians: &[&DirectionJacobian], covariance: &DMatrix<f64>) -> 
     }
     let normal = Matrix3::from_column_slice(weighted.tr_mul(&turn).as_slice());
     if let Some(inverse) = normal.try_inverse() {
-        let inverse = DMatrix::from_column_slice(3, 3, inverse.as_slice());
-        j -= &turn * (inverse * product(&weighted.transpose(), &j));
+        j -= &turn * (dense(&inverse) * product(&weighted.transpose(), &j));
     }
     let left = variances(&j);
     (0..jacobians.len()).map(|k| 0.5 * (left[2 * k] + left[2 * k + 1])).collect()

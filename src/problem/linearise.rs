@@ -10,7 +10,7 @@ use super::equations::{Collector, E, Equations, MarkerTerms};
 use super::state::{Displaced, seen_centre};
 use super::{Image, Layout, MarkerObservation, Problem, State, TakenFrom, Tie};
 use crate::geom::{Pose, adjoint};
-use crate::linalg::{add_combination, wide};
+use crate::linalg::{add_combination, dense, wide};
 use crate::model::circle::Prediction;
 use crate::model::plate_modes::MODES;
 use crate::model::robot::{Kinematics, LinearOrigins};
@@ -383,8 +383,7 @@ impl State {
         }
         let displaced = Displaced::new(&pose, &seen_centre(image, self), values);
         // What moves the pose before the plate is turned moves it after that as seen from the turned plate.
-        let carry = adjoint(&displaced.turned.inverse());
-        let carry = DMatrix::from_column_slice(6, 6, carry.as_slice());
+        let carry = dense(&adjoint(&displaced.turned.inverse()));
         let mut l = &carry * l;
         l.columns_mut(joints, values.len()).copy_from(&displaced.d_components().columns(0, values.len()));
         Some(Chained { pose: displaced.pose, d_theta: carry * g, d_latent: l })

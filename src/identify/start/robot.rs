@@ -15,8 +15,8 @@ use crate::identify::mistakes::suspects::Suspects;
 use crate::identify::start::zeros::place_zeros;
 use crate::identify::start_verdict::{StartReached, StartVerdict};
 use crate::init::{HandEye, HandEyeStart, PosePair, SeenStop, bases, hand_eye_misfit, solve_hand_eye};
-use crate::linalg::median;
 use crate::linalg::symmetric_eigen;
+use crate::linalg::{dense, median};
 use crate::model::one_direction::turns_about_one_direction;
 use crate::model::robot::Robot;
 use crate::problem::{
@@ -336,7 +336,7 @@ fn check_rotations(of: &str, poses: &[PosePair], robot: &Robot, limits: &Limits)
         seen = seen.max(log_so3(&turned).norm());
         largest = largest.max(v.norm());
         travel = travel.max((first.chain.translation - p.chain.translation).norm());
-        m += nalgebra::DMatrix::from_column_slice(3, 3, (v * v.transpose()).as_slice()) / poses.len() as f64;
+        m += dense(&(v * v.transpose())) / poses.len() as f64;
     }
     let second = symmetric_eigen(&m).map_or(0.0, |(values, _)| values[1].max(0.0).sqrt());
     if second > limits.hand_eye_rotation_rad {
