@@ -191,6 +191,19 @@ pub struct Derivatives {
     pub fitted: DMatrix<f64>,
 }
 
+impl Derivatives {
+    /// What the noise of a reading of a point does, m^2: its square at the point itself, and that at all points. It moves the frame, too, by which a
+    /// projection makes that at all points less; `normal` are the normal equations of what is fitted.
+    fn noise_squares(&self, point: usize, reading: usize, normal: &SymmetricFactor) -> [f64; 2] {
+        let own = self.by_noise.fixed_view::<3, 1>(3 * point, reading).into_owned();
+        let fitted = self.fitted.fixed_rows::<3>(3 * point);
+        let taken_up = fitted.tr_mul(&own);
+        let moved = normal.solve(&taken_up);
+        let at_all = own.norm_squared() - taken_up.dot(&moved);
+        [(own - fitted * moved).norm_squared(), at_all.max(0.0)]
+    }
+}
+
 impl PointFit {
     /// Sum of the squares of the residuals, m^2.
     pub(super) fn squares(&self) -> f64 {
@@ -229,17 +242,8 @@ impl PointFit {
         (0..points.len()).for_each(|k| sums.add(&model.fixed_rows::<3>(3 * k).into_owned(), &lacking[k]));
         let [_, most_model_m] = sums.interval_m(covariance, Spread { variance: 0.0, sigma: 0.0 });
         let readings = joint_sigma.len();
-        // The noise of a point moves the frame, too: of its square at the point itself, and of that at all points, which a projection makes less.
-        let of_noise = |k: usize, r: usize| {
-            let own = d.by_noise.fixed_view::<3, 1>(3 * k, r).into_owned();
-            let fitted = d.fitted.fixed_rows::<3>(3 * k);
-            let taken_up = fitted.tr_mul(&own);
-            let moved = normal.solve(&taken_up);
-            let at_all = own.norm_squared() - taken_up.dot(&moved);
-            [(own - fitted * moved).norm_squared(), at_all.max(0.0)]
-        };
-        let noise: Vec<Vec<[f64; 2]>> =
-            (0..points.len()).map(|k| (0..readings).map(|r| of_noise(k, r)).collect()).collect();
+        let of_point_by_noise = |k: usize| (0..readings).map(|r| d.noise_squares(k, r, &normal)).collect();
+        let noise: Vec<Vec<[f64; 2]>> = (0..points.len()).map(of_point_by_noise).collect();
         let of_points = noise.iter().enumerate().map(|(k, noise)| ExpectedSquares {
             model: of_point(k),
             by_reading: noise.iter().map(|[own, _]| *own).collect(),
