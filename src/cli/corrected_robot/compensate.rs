@@ -490,33 +490,42 @@ fn frame(flag: &str, text: Option<&str>, language: Language) -> Result<Option<Po
 /// Targets listed one by one on the terminal; more only by their largest corrections.
 const SHOWN: usize = 10;
 
+/// A target by its number, with what was corrected of it.
+type Done<'a> = (usize, &'a Correction);
+
 fn text(program: &Program, outcomes: &[TargetOutcome], left: &[Left], chain: &Chain) -> String {
-    let mut done: Vec<(usize, &Correction)> = outcomes
+    let done: Vec<Done> = outcomes
         .iter()
         .enumerate()
         .filter_map(|(k, o)| if let TargetOutcome::Done(c) = o { Some((k, c)) } else { None })
         .collect();
+    let targets = format!("targets   {} rewritten, {} unchanged\n", done.len(), left.len());
+    let sizes = if done.is_empty() { String::new() } else { sizes(&done) };
+    let notices: String = program.notices.iter().map(|notice| format!("note      {}\n", notice.coded())).collect();
+    [targets, sizes, largest(done, program, chain), notices, left_as_they_are(left, program)].concat()
+}
+
+/// How large the corrections are, and what rounding leaves.
+fn sizes(done: &[Done]) -> String {
     let rms = |of: fn(&Correction) -> f64| {
         1e3 * (done.iter().map(|(_, c)| of(c).powi(2)).sum::<f64>() / done.len().max(1) as f64).sqrt()
     };
     let worst = |of: fn(&Correction) -> f64| done.iter().map(|(_, c)| of(c)).fold(0.0, f64::max);
-    let mut out = format!("targets   {} rewritten, {} unchanged\n", done.len(), left.len());
-    if !done.is_empty() {
-        let _ = writeln!(
-            out,
-            "correction {:.3} mm and {:.3} mrad RMS, at most {:.3} mm and {:.3} mrad",
-            rms(|c| c.shift_m),
-            rms(|c| c.turn_rad),
-            1e3 * worst(|c| c.shift_m),
-            1e3 * worst(|c| c.turn_rad)
-        );
-        let _ = writeln!(
-            out,
-            "rounding  the numbers as written give these joints to {:.1e} m and {:.1e} rad; how accurate the robot is with them is said below",
-            worst(|c| c.residual_m),
-            worst(|c| c.residual_rad)
-        );
-    }
+    format!(
+        "correction {:.3} mm and {:.3} mrad RMS, at most {:.3} mm and {:.3} mrad\n\
+         rounding  the numbers as written give these joints to {:.1e} m and {:.1e} rad; how accurate the robot is with them is said below\n",
+        rms(|c| c.shift_m),
+        rms(|c| c.turn_rad),
+        1e3 * worst(|c| c.shift_m),
+        1e3 * worst(|c| c.turn_rad),
+        worst(|c| c.residual_m),
+        worst(|c| c.residual_rad)
+    )
+}
+
+/// Every correction; of many the largest.
+fn largest(mut done: Vec<Done>, program: &Program, chain: &Chain) -> String {
+    let mut out = String::new();
     if done.len() > SHOWN {
         let _ = writeln!(out, "largest   {SHOWN} of {} (all in {TABLE}):", done.len());
         done.sort_by(|a, b| b.1.shift_m.total_cmp(&a.1.shift_m));
@@ -537,9 +546,12 @@ fn text(program: &Program, outcomes: &[TargetOutcome], left: &[Left], chain: &Ch
             t.line, t.name, chain.readings[joint]
         );
     }
-    for notice in &program.notices {
-        let _ = writeln!(out, "note      {}", notice.coded());
-    }
+    out
+}
+
+/// Targets that are not rewritten, each with the reason; of many with one reason the first.
+fn left_as_they_are(left: &[Left], program: &Program) -> String {
+    let mut out = String::new();
     let mut told: BTreeMap<&str, usize> = BTreeMap::new();
     for l in left {
         let count = told.entry(&l.why.words).or_default();
