@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::limits::Limits;
 use super::statistics::extent;
 use super::stops::{StopsKnowledge, Structural};
+use crate::linalg::dense;
 use crate::model::robot::{Posture, Robot};
 use crate::problem::Layout;
 use crate::urdf::JointKind;
@@ -84,7 +85,7 @@ impl<'a> Adviser<'a> {
                     stop.readings[reading] = value;
                     let (j, noise) = known.measurement(robot, layout, &stop);
                     let jc = &j * &known.covariance;
-                    let total = DMatrix::from_column_slice(6, 6, noise.as_slice()) + &jc * j.transpose();
+                    let total = dense(&noise) + &jc * j.transpose();
                     let Some(factor) = total.cholesky() else { continue };
                     let Some(taken) = factor.l().solve_lower_triangular(&jc.columns(0, n).into_owned()) else {
                         continue;

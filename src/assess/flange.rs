@@ -16,7 +16,7 @@ use super::statistics::extent;
 use super::stops::halton_stops;
 use super::used_stops::{still, stops};
 use crate::geom::{Pose, adjoint};
-use crate::linalg::SymmetricFactor;
+use crate::linalg::{SymmetricFactor, dense};
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Adjustment, Layout};
 use crate::solve::Spread;
@@ -192,7 +192,7 @@ impl<'a> FlangeModel<'a> {
         let [tool, base] = &self.fitted;
         let mut left = j - tool;
         if self.base_is_fitted {
-            left -= DMatrix::from_column_slice(6, 6, adjoint(&pose.inverse()).as_slice()) * base;
+            left -= dense(&adjoint(&pose.inverse())) * base;
         }
         left
     }

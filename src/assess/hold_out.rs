@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::limits::Limits;
 use crate::geom::Pose;
 use crate::init::resect_near;
-use crate::linalg::symmetric_eigen;
+use crate::linalg::{dense, symmetric_eigen};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, Image, Problem, State, TakenFrom, Weighting, posture_groups, predict};
 use crate::solve::{
@@ -238,7 +238,7 @@ fn along_the_workspace(Adjustment { problem, state }: &Adjustment, postures: Vec
     let mean = mean_of(&all);
     let mut spread = DMatrix::<f64>::zeros(3, 3);
     for d in all.iter().map(|i| place(i) - mean) {
-        spread += DMatrix::from_column_slice(3, 3, (d * d.transpose()).as_slice());
+        spread += dense(&(d * d.transpose()));
     }
     let main = symmetric_eigen(&spread).map_or(Vector3::x(), |(_, v)| Vector3::new(v[(0, 2)], v[(1, 2)], v[(2, 2)]));
     let mut placed: Vec<(f64, Vec<usize>)> =

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3x6, SMatrix, Vector3};
 use super::flange::everywhere;
 use super::mean_square::MeanSquare;
 use crate::geom::{Pose, rigid_fit, skew};
-use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
+use crate::linalg::{SymmetricFactor, dense, product, symmetric_eigen};
 use crate::model::robot::{Posture, Robot};
 use crate::solve::Spread;
 
@@ -66,14 +66,14 @@ pub fn fit_points(robot: &Robot, points: &[MeasuredPoint]) -> Option<PointFit> {
 /// the middle of the points, so that their distance from the base takes nothing off.
 fn told_directions(tips: &[Pose], tip_point: &Vector3<f64>) -> Option<usize> {
     let middle = tips.iter().map(|tip| tip.transform(tip_point)).sum::<Vector3<f64>>() / tips.len().max(1) as f64;
-    let mut n = DMatrix::<f64>::zeros(9, 9);
+    let mut n = DMatrix::<f64>::zeros(FITTED, FITTED);
     for tip in tips {
         let centred = Pose::new(tip.rotation, tip.translation - middle);
         let j = by_frame_and_reflector(&Pose::identity(), &centred, tip_point);
         n += j.transpose() * j;
     }
     let unit: Vec<f64> = n.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
-    let scaled = DMatrix::from_fn(9, 9, |i, k| n[(i, k)] / (unit[i] * unit[k]));
+    let scaled = DMatrix::from_fn(FITTED, FITTED, |i, k| n[(i, k)] / (unit[i] * unit[k]));
     Some(symmetric_eigen(&scaled)?.0.iter().filter(|value| **value > DETERMINED).count())
 }
 
@@ -94,7 +94,7 @@ pub fn freedom(points: usize) -> f64 {
     (3 * points).saturating_sub(FITTED) as f64
 }
 
-/// The same where only the residuals matter.
+/// As [`fit_points`], where only the residuals matter.
 pub(super) fn lay_over(robot: &Robot, points: &[MeasuredPoint]) -> Option<PointFit> {
     fit_points(robot, points).or_else(|| fit(robot, points, HELD))
 }
@@ -119,7 +119,7 @@ fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>, held
     let pairs = tips.iter().zip(points).map(|(tip, p)| (tip.transform(&start), p.position_m));
     let mut frame = rigid_fit(&pairs.collect::<Vec<_>>())?;
     for _ in 0..100 {
-        let (mut n, mut b) = (DMatrix::<f64>::zeros(9, 9), DVector::<f64>::zeros(9));
+        let (mut n, mut b) = (DMatrix::<f64>::zeros(FITTED, FITTED), DVector::<f64>::zeros(FITTED));
         for (tip, p) in tips.iter().zip(points) {
             let y = tip.transform(&tip_point);
             let r = p.position_m - frame.transform(&y);
@@ -134,7 +134,7 @@ fn from_start(tips: &[Pose], points: &[MeasuredPoint], start: Vector3<f64>, held
             break;
         }
     }
-    if held == 0.0 && told_directions(tips, &tip_point)? < 9 {
+    if held == 0.0 && told_directions(tips, &tip_point)? < FITTED {
         return None;
     }
     let residuals_m: Vec<Vector3<f64>> =
@@ -148,9 +148,9 @@ pub(super) fn by_frame_and_reflector(
     device_from_base: &Pose,
     base_from_tip: &Pose,
     tip_point_m: &Vector3<f64>,
-) -> SMatrix<f64, 3, 9> {
+) -> SMatrix<f64, 3, FITTED> {
     let rotation = &device_from_base.rotation;
-    let mut by = SMatrix::<f64, 3, 9>::zeros();
+    let mut by = SMatrix::<f64, 3, FITTED>::zeros();
     by.fixed_view_mut::<3, 3>(0, 0).copy_from(rotation);
     by.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-rotation * skew(&base_from_tip.transform(tip_point_m))));
     by.fixed_view_mut::<3, 3>(0, 6).copy_from(&(rotation * base_from_tip.rotation));
@@ -191,6 +191,19 @@ pub struct Derivatives {
     pub fitted: DMatrix<f64>,
 }
 
+impl Derivatives {
+    /// What the noise of a reading of a point does, m^2: its square at the point itself, and that at all points. It moves the frame, too, by which a
+    /// projection makes that at all points less; `normal` are the normal equations of what is fitted.
+    fn noise_squares(&self, point: usize, reading: usize, normal: &SymmetricFactor) -> [f64; 2] {
+        let own = self.by_noise.fixed_view::<3, 1>(3 * point, reading).into_owned();
+        let fitted = self.fitted.fixed_rows::<3>(3 * point);
+        let taken_up = fitted.tr_mul(&own);
+        let moved = normal.solve(&taken_up);
+        let at_all = own.norm_squared() - taken_up.dot(&moved);
+        [(own - fitted * moved).norm_squared(), at_all.max(0.0)]
+    }
+}
+
 impl PointFit {
     /// Sum of the squares of the residuals, m^2.
     pub(super) fn squares(&self) -> f64 {
@@ -229,17 +242,8 @@ impl PointFit {
         (0..points.len()).for_each(|k| sums.add(&model.fixed_rows::<3>(3 * k).into_owned(), &lacking[k]));
         let [_, most_model_m] = sums.interval_m(covariance, Spread { variance: 0.0, sigma: 0.0 });
         let readings = joint_sigma.len();
-        // The noise of a point moves the frame, too: of its square at the point itself, and of that at all points, which a projection makes less.
-        let of_noise = |k: usize, r: usize| {
-            let own = d.by_noise.fixed_view::<3, 1>(3 * k, r).into_owned();
-            let fitted = d.fitted.fixed_rows::<3>(3 * k);
-            let taken_up = fitted.tr_mul(&own);
-            let moved = normal.solve(&taken_up);
-            let at_all = own.norm_squared() - taken_up.dot(&moved);
-            [(own - fitted * moved).norm_squared(), at_all.max(0.0)]
-        };
-        let noise: Vec<Vec<[f64; 2]>> =
-            (0..points.len()).map(|k| (0..readings).map(|r| of_noise(k, r)).collect()).collect();
+        let of_point_by_noise = |k: usize| (0..readings).map(|r| d.noise_squares(k, r, &normal)).collect();
+        let noise: Vec<Vec<[f64; 2]>> = (0..points.len()).map(of_point_by_noise).collect();
         let of_points = noise.iter().enumerate().map(|(k, noise)| ExpectedSquares {
             model: of_point(k),
             by_reading: noise.iter().map(|[own, _]| *own).collect(),
@@ -267,7 +271,7 @@ impl PointFit {
         Some(fit_points(other, &points.iter().map(by_robot).collect::<Vec<_>>())?.residuals_m)
     }
 
-    /// Those of points.
+    /// Derivatives of points with so many `columns` of the robot; `joint_sigma` of every reading, rad or m.
     pub fn derivatives(
         &self,
         robot: &Robot,
@@ -278,17 +282,17 @@ impl PointFit {
         let (n, readings) = (points.len(), joint_sigma.len());
         let mut by_model = DMatrix::zeros(3 * n, columns);
         let mut by_noise = DMatrix::zeros(3 * n, readings);
-        let mut fitted = DMatrix::zeros(3 * n, 9);
+        let mut fitted = DMatrix::zeros(3 * n, FITTED);
         for (k, p) in points.iter().enumerate() {
             let of_point = self.derivatives_at(robot, p, joint_sigma);
             by_model.view_mut((3 * k, 0), (3, columns)).copy_from(&of_point.by_model);
             by_noise.view_mut((3 * k, 0), (3, readings)).copy_from(&of_point.by_noise);
-            fitted.view_mut((3 * k, 0), (3, 9)).copy_from(&of_point.fitted);
+            fitted.view_mut((3 * k, 0), (3, FITTED)).copy_from(&of_point.fitted);
         }
         Derivatives { by_model, by_noise, fitted }
     }
 
-    /// Those of one point.
+    /// The same of one point.
     pub(super) fn derivatives_at(&self, robot: &Robot, point: &MeasuredPoint, joint_sigma: &[f64]) -> Derivatives {
         let kinematics = robot.kinematics(&Posture::at(&point.readings), &vec![0.0; joint_sigma.len()]);
         let tip = kinematics.base_from_tip;
@@ -309,6 +313,6 @@ impl PointFit {
             by_noise.fixed_view_mut::<3, 1>(0, r).copy_from(&(moved * d * *sigma));
         }
         let by = by_frame_and_reflector(&self.device_from_base, &tip, &self.tip_point_m);
-        Derivatives { by_model, by_noise, fitted: DMatrix::from_column_slice(3, 9, by.as_slice()) }
+        Derivatives { by_model, by_noise, fitted: dense(&by) }
     }
 }

@@ -4,11 +4,11 @@
 //! `J` the derivative of the images of directions by the parameters of the camera, `R` that by a turn, and weights `W`
 //! (inverse variances, so that the turn follows where the camera is known), the covariance is `P J C J' P'`, `P = 1 - R (R' W R)^-1 R' W`.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::geom::skew;
-use crate::linalg::product;
+use crate::linalg::{dense, product};
 use crate::model::camera::{Camera, MAX_PARAMETERS};
 
 /// Places of the map across the image.
@@ -31,25 +31,19 @@ impl ProjectionMap {
     /// The map of a camera from the covariance of its parameters, for points at `depth_m`.
     pub fn new(camera: &Camera, covariance: &DMatrix<f64>, depth_m: f64) -> Self {
         let rows = (ACROSS * camera.height_px as usize).div_ceil(camera.width_px.max(1) as usize).max(2);
-        let place = |k: usize, n: usize, px: u32| k as f64 * (f64::from(px) - 1.0) / (n - 1) as f64;
-        let places = (0..ACROSS * rows).map(|k| {
-            Vector2::new(place(k % ACROSS, ACROSS, camera.width_px), place(k / ACROSS, rows, camera.height_px))
-        });
-        let lines: Vec<Option<Lines>> = places.map(|uv| Lines::at(camera, &uv, depth_m)).collect();
-        let seen: Vec<&Lines> = lines.iter().flatten().collect();
+        let places = (0..ACROSS * rows).map(|k| place(k, [ACROSS, rows], [camera.width_px, camera.height_px]));
+        let jacobians: Vec<Option<DirectionJacobian>> =
+            places.map(|uv| DirectionJacobian::at(camera, &uv, depth_m)).collect();
+        let seen: Vec<&DirectionJacobian> = jacobians.iter().flatten().collect();
         let variances = without_turn(&seen, covariance);
         let mut known = variances.iter();
-        let sigma = |l: &Option<Lines>| l.as_ref().and_then(|_| known.next()).map(|v| v.max(0.0).sqrt());
-        Self { columns: ACROSS, rows, depth_m, sigma_px: lines.iter().map(sigma).collect() }
+        let sigma = |j: &Option<DirectionJacobian>| j.as_ref().and_then(|_| known.next()).map(|v| v.max(0.0).sqrt());
+        Self { columns: ACROSS, rows, depth_m, sigma_px: jacobians.iter().map(sigma).collect() }
     }
 
     /// Place of an entry in the image, px.
     pub fn place(&self, entry: usize, width_px: u32, height_px: u32) -> Vector2<f64> {
-        let along = |k: usize, n: usize, px: u32| k as f64 * (f64::from(px) - 1.0) / (n.max(2) - 1) as f64;
-        Vector2::new(
-            along(entry % self.columns, self.columns, width_px),
-            along(entry / self.columns, self.rows, height_px),
-        )
+        place(entry, [self.columns, self.rows], [width_px, height_px])
     }
 
     /// Largest entry, px; none for an empty map.
@@ -72,13 +66,19 @@ impl ProjectionMap {
     }
 }
 
-/// Derivatives of the image of one direction.
-struct Lines {
-    by_parameters: DMatrix<f64>,
-    by_turn: nalgebra::Matrix2x3<f64>,
+/// Place of an entry of so many columns and rows in an image of this size, px.
+fn place(entry: usize, [columns, rows]: [usize; 2], [width_px, height_px]: [u32; 2]) -> Vector2<f64> {
+    let along = |k: usize, n: usize, px: u32| k as f64 * (f64::from(px) - 1.0) / (n.max(2) - 1) as f64;
+    Vector2::new(along(entry % columns, columns, width_px), along(entry / columns, rows, height_px))
 }
 
-impl Lines {
+/// Derivatives of the image of one direction.
+struct DirectionJacobian {
+    by_parameters: DMatrix<f64>,
+    by_turn: Matrix2x3<f64>,
+}
+
+impl DirectionJacobian {
     fn at(camera: &Camera, uv: &Vector2<f64>, depth_m: f64) -> Option<Self> {
         let x = camera.ray(uv)? * depth_m;
         let p = camera.project_with_jacobian(&x)?;
@@ -93,12 +93,12 @@ impl Lines {
     }
 }
 
-/// Mean variance of both axes of every line, px^2.
-fn without_turn(lines: &[&Lines], covariance: &DMatrix<f64>) -> Vec<f64> {
-    let n = 2 * lines.len();
+/// Mean variance of both axes of every direction, px^2.
+fn without_turn(jacobians: &[&DirectionJacobian], covariance: &DMatrix<f64>) -> Vec<f64> {
+    let n = 2 * jacobians.len();
     let mut j = DMatrix::zeros(n, covariance.nrows());
     let mut turn = DMatrix::zeros(n, 3);
-    for (k, l) in lines.iter().enumerate() {
+    for (k, l) in jacobians.iter().enumerate() {
         j.rows_mut(2 * k, 2).copy_from(&l.by_parameters);
         turn.rows_mut(2 * k, 2).copy_from(&l.by_turn);
     }
@@ -107,6 +107,7 @@ fn without_turn(lines: &[&Lines], covariance: &DMatrix<f64>) -> Vec<f64> {
         DVector::from_fn(n, |k, _| jc.row(k).dot(&j.row(k)))
     };
     let raw = variances(&j);
+    // Weights stay finite where the camera is known exactly.
     let floor = 1e-12 + 1e-6 * raw.max();
     let mut weighted = turn.clone();
     for (k, mut row) in weighted.row_iter_mut().enumerate() {
@@ -114,9 +115,8 @@ fn without_turn(lines: &[&Lines], covariance: &DMatrix<f64>) -> Vec<f64> {
     }
     let normal = Matrix3::from_column_slice(weighted.tr_mul(&turn).as_slice());
     if let Some(inverse) = normal.try_inverse() {
-        let inverse = DMatrix::from_column_slice(3, 3, inverse.as_slice());
-        j -= &turn * (inverse * product(&weighted.transpose(), &j));
+        j -= &turn * (dense(&inverse) * product(&weighted.transpose(), &j));
     }
     let left = variances(&j);
-    (0..lines.len()).map(|k| 0.5 * (left[2 * k] + left[2 * k + 1])).collect()
+    (0..jacobians.len()).map(|k| 0.5 * (left[2 * k] + left[2 * k + 1])).collect()
 }

@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 use crate::geom::adjoint;
-use crate::linalg::{SymmetricFactor, product, symmetric_eigen};
+use crate::linalg::{SymmetricFactor, dense, product, symmetric_eigen};
 use crate::model::robot::{Posture, Robot};
 use crate::problem::Layout;
 use crate::urdf::JointKind;
@@ -52,7 +52,7 @@ impl StopsKnowledge {
         let mut all = DMatrix::zeros(n + FRAMES, n + FRAMES);
         for stop in stops {
             let (j, noise) = known.measurement(robot, layout, stop);
-            let wj = DMatrix::from_column_slice(6, 6, noise.try_inverse()?.as_slice()) * &j;
+            let wj = dense(&noise.try_inverse()?) * &j;
             all += product(&j.transpose(), &wj);
         }
         // Frames may be anywhere: a prior of 1 m and 1 rad says nothing beside the stops.

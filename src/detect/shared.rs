@@ -1,4 +1,6 @@
-//! Numbers that several detectors share.
+//! What several detectors share.
+
+use crate::error::{Code, Error};
 
 /// What print, lens and blur of other shapes leave beyond the noise of an edge or a corner, px per axis; seen on real boards after their
 /// printing errors are taken out.
@@ -13,3 +15,8 @@ pub(super) const KEEP_OFF_PX: f64 = 2.0;
 pub(super) const MISSING: f64 = 0.3;
 /// ... where this many of it are in view.
 pub(super) const LEAST_IN_VIEW: usize = 3;
+
+/// A picture in a mirror, of what is said to be in it.
+pub(super) fn mirrored(what: &str) -> Error {
+    Error::new(Code::PlateMirrored, "image", what, "turn off mirroring in the camera or in the image export")
+}

@@ -88,7 +88,7 @@ pub use no_gain::NoGain;
 pub use noticed::Noticed;
 pub use odd_image::OddImage;
 pub use parameter_off::ParameterOff;
-pub use plate_size::{DoubtedSize, InOrder, PlateSize, ToldBy, sizes_by_robot, uneven_plates};
+pub use plate_size::{DoubtedSize, InOrder, SizeDifference, ToldBy, sizes_by_robot, uneven_plates};
 pub use reading_ratio::ReadingRatio;
 pub use repeated_measurements::RepeatedMeasurements;
 pub use rounded_readings::ReadingsRounded;

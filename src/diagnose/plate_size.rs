@@ -152,25 +152,11 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
     doubts
 }
 
-/// By how much plates are larger than stated for a robot that is held, each with its standard deviation: where `fitted` has camera and plates fitted
-/// to it, all lengths are the robot's. None of a plate whose size nothing tells.
-pub fn sizes_by_robot(fitted: &Adjustment) -> Vec<PlateSize> {
-    let of = |plate: usize| {
-        let SizeDifference { off, sigma } = ReleasedSize::of(fitted, plate).one_step()?;
-        Some(PlateSize { plate: fitted.problem.plate_name(plate), off, sigma })
-    };
+/// By how much plates, by their names, are larger than stated for a robot that is held, which counts as exact: where `fitted` has camera and plates
+/// fitted to it, all lengths are the robot's. None of a plate whose size nothing tells.
+pub fn sizes_by_robot(fitted: &Adjustment) -> Vec<(String, SizeDifference)> {
+    let of = |plate: usize| Some((fitted.problem.plate_name(plate), ReleasedSize::of(fitted, plate).one_step()?));
     (0..fitted.problem.plates.len()).filter_map(of).collect()
-}
-
-/// How large a plate is for a robot.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlateSize {
-    /// The plate; its number where there are several.
-    pub plate: String,
-    /// By how much it is larger than stated, relative.
-    pub off: f64,
-    /// Standard deviation of that, that of the stated size included; the robot counts as exact.
-    pub sigma: f64,
 }
 
 /// Plates whose rows and columns differ in scale, as images alone say: their shape needs no robot.
@@ -313,11 +299,13 @@ impl Kind for DoubtedSize {
     }
 }
 
-/// What images and links say of the size of a plate, less the stated one, and the standard deviation of that difference.
-#[derive(Clone, Copy)]
-struct SizeDifference {
-    off: f64,
-    sigma: f64,
+/// What images and links say of the size of a plate, less the stated one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SizeDifference {
+    /// By how much it is larger than stated, relative.
+    pub off: f64,
+    /// Standard deviation of that, that of the stated size included.
+    pub sigma: f64,
 }
 
 impl SizeDifference {

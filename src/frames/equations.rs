@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
 use super::robot::KnownRobot;
 use super::touch::{Touch, TouchPlace, Touches};
 use crate::geom::{Pose, adjoint, skew};
+use crate::linalg::dense;
 use crate::model::robot::Posture;
 
 /// What is known beside the touches.
@@ -138,11 +139,6 @@ fn moved(rotation: &Matrix3<f64>, point: &Vector3<f64>) -> DMatrix<f64> {
     d.view_mut((0, 0), (3, 3)).copy_from(rotation);
     d.view_mut((0, 3), (3, 3)).copy_from(&(-rotation * skew(point)));
     d
-}
-
-/// A fixed 6x6 matrix as a dense one.
-fn dense(m: &Matrix6<f64>) -> DMatrix<f64> {
-    DMatrix::from_column_slice(6, 6, m.as_slice())
 }
 
 /// Equations of a measurement at a posture.

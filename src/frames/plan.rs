@@ -16,7 +16,7 @@ use super::touch::TouchPlace;
 use crate::assess::Limits;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
-use crate::linalg::{SymmetricFactor, product};
+use crate::linalg::{SymmetricFactor, dense, product};
 use crate::model::inverse::{Reach, reading_limits, solve_from};
 use crate::model::robot::Posture;
 
@@ -240,8 +240,7 @@ impl Search<'_> {
     fn inverse_of<'c>(&self, set: impl Iterator<Item = &'c Candidate>, before: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let mut n = before.clone();
         for c in set {
-            let weight = c.v.try_inverse()?;
-            let wj = DMatrix::from_column_slice(3, 3, weight.as_slice()) * &c.j;
+            let wj = dense(&c.v.try_inverse()?) * &c.j;
             n += product(&c.j.transpose(), &wj);
         }
         Some(SymmetricFactor::new(&n).ok()?.inverse())

@@ -9,7 +9,7 @@ use super::start::turns;
 use super::start::zeros::other_zeros;
 use crate::assess::Limits;
 use crate::assess::{ImageError, cluster_of_images, hold_out_images};
-use crate::diagnose::{PlateSize, ZeroOff, sizes_by_robot, zeros_off};
+use crate::diagnose::{SizeDifference, ZeroOff, sizes_by_robot, zeros_off};
 use crate::error::{Code, Error, Result};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries};
@@ -29,10 +29,10 @@ pub struct JudgedImage {
 }
 
 /// What a series says of a robot that it was not fitted to.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum JudgedSeries {
-    /// The errors of all images, and the sizes of the plates.
-    Images(JudgedByImages),
+    /// The errors of all images, with the fit that tells the sizes of the plates.
+    Images(Box<JudgedByImages>),
     /// Its readings and the images do not belong together, and do with other zeros of its joints.
     OtherZeros(Box<RobotOfOtherZeros>),
 }
@@ -48,12 +48,19 @@ impl JudgedSeries {
 }
 
 /// What images say of a robot.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct JudgedByImages {
     /// The error of each.
     pub images: Vec<JudgedImage>,
-    /// How large the plates are for this robot: no error of an image holds what all its lengths are off by.
-    pub sizes: Vec<PlateSize>,
+    /// Camera and plates, fitted to this robot.
+    fitted: Adjustment,
+}
+
+impl JudgedByImages {
+    /// How large the plates are for this robot, by their names: no error of an image holds what all its lengths are off by.
+    pub fn plate_sizes(&self) -> Vec<(String, SizeDifference)> {
+        sizes_by_robot(&self.fitted)
+    }
 }
 
 /// A robot with other zeros than those of the one that is judged.
@@ -103,7 +110,7 @@ pub fn verify_series(robot: &Robot, series: &[MeasuredSeries], limits: &Limits) 
         return Ok(JudgedSeries::OtherZeros(Box::new(other)));
     }
     adjustment.tie_to_readings(false);
-    Ok(JudgedSeries::Images(held_out(adjustment, limits)?))
+    Ok(JudgedSeries::Images(Box::new(held_out(adjustment, limits)?)))
 }
 
 /// Errors of images that camera and plate were not fitted to.
@@ -128,5 +135,5 @@ fn held_out(adjustment: Adjustment, limits: &Limits) -> Result<JudgedByImages> {
         error,
     };
     let images = errors.into_iter().map(judged).collect();
-    Ok(JudgedByImages { images, sizes: sizes_by_robot(&outcome.adjustment) })
+    Ok(JudgedByImages { images, fitted: outcome.adjustment })
 }

@@ -20,8 +20,13 @@ use faer::linalg::evd;
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Conj, MatMut, MatRef, Par};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SMatrix};
 use rayon::prelude::*;
+
+/// A matrix of fixed size as one of any size.
+pub fn dense<const R: usize, const C: usize>(fixed: &SMatrix<f64, R, C>) -> DMatrix<f64> {
+    DMatrix::from_column_slice(R, C, fixed.as_slice())
+}
 
 /// Cholesky factor of a symmetric positive definite matrix, with the diagonal scaled to one first.
 #[derive(Debug, Clone)]

@@ -6,7 +6,7 @@ use super::body::BodyTerms;
 use super::equations::E;
 use super::linearise::{Chained, ImageTerms};
 use super::{Image, Layout};
-use crate::linalg::SymmetricFactor;
+use crate::linalg::{SymmetricFactor, dense};
 
 /// What something at a stop tells: information about its pose (6), and of an image about its intrinsics ([`E`] more).
 #[derive(Debug, Clone)]
@@ -29,7 +29,7 @@ impl SeenAtStop {
 
     /// A measurement of a body, by its blocks.
     pub fn of_body(terms: &BodyTerms, by_latents: DMatrix<f64>) -> Self {
-        Self { own: DMatrix::from_column_slice(6, 6, terms.pp.as_slice()), by_latents }
+        Self { own: dense(&terms.pp), by_latents }
     }
 }
 

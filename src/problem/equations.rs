@@ -1,4 +1,4 @@
-//! The observations of one image as whitened equations, and how markers are coupled with the other unknowns through them.
+//! The observations of one image as whitened equations.
 //!
 //! An observation with the weight `W = F F'` gives two equations `F' [J_p, J_e, r]`; all sums of the normal equations are products of
 //! them. A marker moves its image as a shift of the whole plate does, so its derivatives are those of the first three components of the pose.
@@ -193,18 +193,6 @@ impl Equations {
         }
         all
     }
-
-    /// Coupling of every marker that was seen with the other unknowns of the image.
-    pub fn marker_couplings(&self) -> Vec<MarkerCoupling> {
-        let mut all: Vec<MarkerCoupling> = Vec::new();
-        for (&marker, sight) in self.markers.iter().zip(self.sights()) {
-            if all.last().is_none_or(|last| last.marker != marker) {
-                all.push(MarkerCoupling { marker, mp: SMatrix::zeros(), me: SMatrix::zeros(), field: Vec::new() });
-            }
-            all.iter_mut().last().into_iter().for_each(|last| last.add(&sight));
-        }
-        all
-    }
 }
 
 /// Sums of products of the rows of an image with other columns.
@@ -315,39 +303,5 @@ impl MarkerTerms {
         let ([a, b], r) = (sight.row_range(POSE..POSE + 3), sight.residual());
         self.upper.iter_mut().zip(upper).for_each(|(own, (i, k))| *own += a[i] * a[k] + b[i] * b[k]);
         self.bm.iter_mut().enumerate().for_each(|(k, own)| *own += a[k] * r[0] + b[k] * r[1]);
-    }
-}
-
-/// Normal-equation blocks of one marker with the other unknowns of one image.
-#[derive(Debug, Clone)]
-pub struct MarkerCoupling {
-    /// Index of the marker on its plate.
-    pub marker: usize,
-    /// With the pose.
-    pub mp: SMatrix<f64, 3, P>,
-    /// With the intrinsics before the field.
-    pub me: SMatrix<f64, 3, E>,
-    /// With the control points of the field that it touches, ascending, by their places among those that the image touches.
-    pub field: Vec<(usize, Matrix3x2<f64>)>,
-}
-
-impl MarkerCoupling {
-    fn add(&mut self, sight: &Sight) {
-        let by_marker = sight.by_marker();
-        self.mp += by_marker * sight.by_pose().transpose();
-        self.me += by_marker * sight.by_intrinsics().transpose();
-        for (k, d) in sight.by_field() {
-            let coupling = by_marker * d;
-            match self.field.binary_search_by_key(k, |f| f.0) {
-                Ok(at) => self.field[at].1 += coupling,
-                Err(at) => self.field.insert(at, (*k, coupling)),
-            }
-        }
-    }
-
-    /// With every intrinsic unknown that it touches: its index, and a column.
-    pub fn intrinsics(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
-        let field = self.field.iter().flat_map(|(k, c)| [0, 1].map(|d| (E + 2 * k + d, c.column(d).into_owned())));
-        (0..E).map(|e| (e, self.me.column(e).into_owned())).chain(field)
     }
 }

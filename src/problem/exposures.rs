@@ -6,16 +6,16 @@ use super::measured_series::MeasuredStop;
 use crate::series::{Edge, Observation};
 
 /// A contour and the bits of its place in the image.
-type Seen = (u32, Edge, [u64; 2]);
+type PlacedContour = (u32, Edge, [u64; 2]);
 
-fn seen(o: &Observation) -> Seen {
+fn seen(o: &Observation) -> PlacedContour {
     (o.marker, o.edge, o.uv.map(f64::to_bits))
 }
 
 /// What was seen in some images, to the last digit. Noise never puts a marker in the same place twice: another image that shows it there was
 /// made of the same exposure, in whatever file it came.
 #[derive(Debug)]
-pub struct Exposures(HashSet<Seen>);
+pub struct Exposures(HashSet<PlacedContour>);
 
 impl Exposures {
     /// Of these stops.

@@ -261,11 +261,4 @@ impl Layout {
     pub fn find(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|c| c.name == name)
     }
-
-    /// Sets the columns whose name fulfils `which` free or fixed.
-    pub fn set_free(&mut self, free: bool, which: impl Fn(&str) -> bool) {
-        for column in self.columns.iter_mut().filter(|c| which(&c.name)) {
-            column.free = free;
-        }
-    }
 }

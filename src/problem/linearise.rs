@@ -10,7 +10,7 @@ use super::equations::{Collector, E, Equations, MarkerTerms};
 use super::state::{Displaced, seen_centre};
 use super::{Image, Layout, MarkerObservation, Problem, State, TakenFrom, Tie};
 use crate::geom::{Pose, adjoint};
-use crate::linalg::{add_combination, wide};
+use crate::linalg::{add_combination, dense, wide};
 use crate::model::circle::Prediction;
 use crate::model::plate_modes::MODES;
 use crate::model::robot::{Kinematics, LinearOrigins};
@@ -200,7 +200,7 @@ fn whitened(
 }
 
 /// An observation in use.
-struct Seen {
+struct UsedObservation {
     marker: usize,
     /// Derivative of its prediction by the modes of the plate.
     by_modes: SMatrix<f64, MODES, 2>,
@@ -218,7 +218,7 @@ fn each_seen(
     state: &State,
     pose: &Pose,
     weighting: &Weighting,
-    mut tell: impl FnMut(&Prediction, &Seen),
+    mut tell: impl FnMut(&Prediction, &UsedObservation),
 ) -> Option<()> {
     let (plate, camera) = (&state.plates[image.plate], &state.cameras[image.camera]);
     let precision = 1.0 / weighting.pixel_factor;
@@ -236,7 +236,7 @@ fn each_seen(
         let (cost, weight) = weighting.huber(normalised);
         let root = if weight < 1.0 { root * weight.sqrt() } else { root };
         let residual = Residual { observation, duv, normalised, weight };
-        tell(&p, &Seen { marker: o.marker, by_modes, residual, cost, root });
+        tell(&p, &UsedObservation { marker: o.marker, by_modes, residual, cost, root });
     }
     Some(())
 }
@@ -383,8 +383,7 @@ impl State {
         }
         let displaced = Displaced::new(&pose, &seen_centre(image, self), values);
         // What moves the pose before the plate is turned moves it after that as seen from the turned plate.
-        let carry = adjoint(&displaced.turned.inverse());
-        let carry = DMatrix::from_column_slice(6, 6, carry.as_slice());
+        let carry = dense(&adjoint(&displaced.turned.inverse()));
         let mut l = &carry * l;
         l.columns_mut(joints, values.len()).copy_from(&displaced.d_components().columns(0, values.len()));
         Some(Chained { pose: displaced.pose, d_theta: carry * g, d_latent: l })

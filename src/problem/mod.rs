@@ -40,7 +40,7 @@ pub use approach::{postures_of_run, postures_of_stops, runs};
 pub use body::{BodyMeasurement, BodyRejection, BodySeen, BodyTerms, Instrument, InstrumentKind, places_body};
 pub use bounds::Bounds;
 pub use condensed::{SeenAtStop, by_columns, condensed};
-pub use equations::{E, Equations, MarkerCoupling, MarkerTerms, Sight};
+pub use equations::{E, Equations, MarkerTerms, Sight};
 pub use exposures::Exposures;
 pub use family::{Family, FamilyKind};
 pub use given::{HUBER, Problem, TakenBodies};

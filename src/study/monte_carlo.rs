@@ -23,7 +23,7 @@ use crate::error::Result;
 use crate::fit::Fit;
 use crate::geom::Pose;
 use crate::identify::{Options, RobotModel, Solution, identify};
-use crate::linalg::SymmetricFactor;
+use crate::linalg::{SymmetricFactor, dense};
 use crate::model::robot::{Posture, Robot};
 use crate::problem::{Adjustment, Problem, State, TakenFrom};
 use crate::series::{Plate, PlateKind};
@@ -288,7 +288,7 @@ fn camera_error(s: &Solution, world: &SimulatedSeries) -> ErrorWithCovariance {
 
 fn pose_error(estimate: &Pose, truth: &Pose, covariance: &Matrix6<f64>) -> ErrorWithCovariance {
     let error = (truth.inverse() * *estimate).log();
-    (DVector::from_column_slice(error.as_slice()), DMatrix::from_column_slice(6, 6, covariance.as_slice()))
+    (DVector::from_column_slice(error.as_slice()), dense(covariance))
 }
 
 fn mounting_error(s: &Solution, world: &SimulatedSeries) -> ErrorWithCovariance {

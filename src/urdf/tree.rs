@@ -45,17 +45,8 @@ impl RobotDescription {
             Some(name) => self.known_link(name, "tip")?,
             None => self.default_tip(base)?,
         };
-        let mut chain = Chain {
-            robot: self.name.clone(),
-            base: base.to_string(),
-            tip: tip.to_string(),
-            joints: Vec::new(),
-            readings: Vec::new(),
-            reading_kinds: Vec::new(),
-            masses: Vec::new(),
-            beside: Vec::new(),
-            behind_tip: Vec::new(),
-        };
+        let mut chain =
+            Chain { robot: self.name.clone(), base: base.to_string(), tip: tip.to_string(), ..Chain::empty() };
         let (up, down) = self.path(base, tip)?;
         if up.len() + down.len() > MOST_JOINTS {
             let what = format!("has {} joints between \"{base}\" and \"{tip}\"", up.len() + down.len());

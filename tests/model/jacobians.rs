@@ -3,6 +3,7 @@
 //! Tolerances: both sides are sums of some tens of products in f64 and differ by rounding alone, about 1e-14 of the largest entry
 //! of the block; circles lose two or three digits more, because moments of the contour (px^3) are divided by its area (px^2).
 
+use crate::support::couplings::marker_couplings;
 use crate::support::small::{Dice, Part, Request, all_terms, problem};
 use crate::support::witness::{self, D, Seed, body_twist, constant, variable};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
@@ -390,7 +391,7 @@ fn check_image(problem: &Problem, state: &State, image: &Image, pose: &Pose) {
         (Matrix6::<f64>::zeros(), SMatrix::<f64, 6, E>::zeros(), SMatrix::<f64, E, E>::zeros());
     let (mut bp, mut be) = (Vector6::zeros(), SMatrix::<f64, E, 1>::zeros());
     let mut cost = 0.0;
-    let couplings = equations(image, state, pose, &weighting).unwrap().marker_couplings();
+    let couplings = marker_couplings(&equations(image, state, pose, &weighting).unwrap());
     assert_eq!(library.markers.len(), image.used().count());
     assert_eq!(couplings.len(), library.markers.len());
     for ((o, terms), coupling) in image.used().zip(&library.markers).zip(&couplings) {
@@ -429,8 +430,8 @@ fn check_image(problem: &Problem, state: &State, image: &Image, pose: &Pose) {
         be += je.transpose() * w * r;
         assert_eq!([terms.marker, coupling.marker], [o.marker; 2]);
         assert_same("mm", &terms.information(), &(jm.transpose() * w * jm), CIRCLE);
-        assert_same("mp", &coupling.mp, &(jm.transpose() * w * jp), CIRCLE);
-        assert_same("me", &coupling.me, &(jm.transpose() * w * je), CIRCLE);
+        assert_same("mp", &coupling.with_pose, &(jm.transpose() * w * jp), CIRCLE);
+        assert_same("me", &coupling.with_intrinsics, &(jm.transpose() * w * je), CIRCLE);
         assert_same("bm", &terms.bm, &(jm.transpose() * w * r), CIRCLE.max(1e-9 / r.norm()));
     }
     assert!((library.cost - cost).abs() < 1e-8 * cost.max(1.0), "{} {cost}", library.cost);

@@ -8,6 +8,7 @@ use crate::outputs_support::truth_frame::{
 };
 use crate::outputs_support::{context, robot, series, series_with_bar_in_two_places};
 use crate::robots::made_with;
+use crate::support::couplings::marker_couplings;
 use crate::whole::{PoseYaml, positions};
 use nalgebra::{DMatrix, Matrix6, Vector3};
 use rayon::prelude::*;
@@ -71,11 +72,11 @@ impl Whole {
             h.view_mut((6, 0), (e, 6)).copy_from(&terms.pe.transpose());
             h.view_mut((6, 6), (e, e)).copy_from(&terms.ee);
             a += j.transpose() * h * &j;
-            let couplings = linear.image(k).equations().unwrap().marker_couplings();
+            let couplings = marker_couplings(&linear.image(k).equations().unwrap());
             for (own_terms, t) in terms.markers.iter().zip(&couplings) {
                 let mut c = DMatrix::<f64>::zeros(3, 6 + e);
-                c.view_mut((0, 0), (3, 6)).copy_from(&t.mp);
-                c.view_mut((0, 6), (3, e)).copy_from(&t.me);
+                c.view_mut((0, 0), (3, 6)).copy_from(&t.with_pose);
+                c.view_mut((0, 6), (3, e)).copy_from(&t.with_intrinsics);
                 let row = c * &j;
                 let at = marker_start + 3 * t.marker;
                 let mut own = a.view_mut((at, at), (3, 3));

@@ -1,7 +1,7 @@
 //! The normal equations against dense ones from dual numbers: whatever is eliminated first, and however many images a stop has.
 
 use crate::support::dense::{Dense, Unknown};
-use crate::support::small::{Dice, Request, free_poses, problem};
+use crate::support::small::{Dice, Request, free_poses, hold, problem};
 use nalgebra::{DMatrix, DVector, Vector3};
 use robotcal::assess::{Limits, clustered_covariance};
 use robotcal::fit::{Fit, NoEvidence, fit_of_outcome, log_evidence, log_evidence_of_outcome};
@@ -32,7 +32,7 @@ fn awkward(mount: CameraMount) -> (Problem, State) {
     problem.images[2].observations[3].rejected = Some(ObservationRejection::Excluded);
     problem.plates[0].markers[4].sigma_m = 3e-5;
     measure_distance(&mut problem, 4, 11);
-    problem.layout.set_free(false, |name| name.ends_with("joint_2/origin.rx") || name == "camera/front/lens.k3");
+    hold(&mut problem.layout, |name| name.ends_with("joint_2/origin.rx") || name == "camera/front/lens.k3");
     (problem, state)
 }
 

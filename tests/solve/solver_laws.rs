@@ -1,6 +1,6 @@
 //! What must hold of any solver of this problem, whatever it eliminates first.
 
-use crate::support::small::{Dice, Part, Request, free_poses, problem, series};
+use crate::support::small::{Dice, Part, Request, free_poses, hold, problem, series};
 use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
 use robotcal::assess::Limits;
 use robotcal::geom::{Pose, exp_so3};
@@ -80,7 +80,7 @@ fn another_plate_frame_changes_nothing() {
     let mut dice = Dice::new(22);
     let (mut problem, state) = problem(&mut dice, &Request::default());
     // Modes are about the origin of the plate and would mean something else.
-    problem.layout.set_free(false, |n| n.starts_with("plate_shape"));
+    hold(&mut problem.layout, |n| n.starts_with("plate_shape"));
     let mut start = state;
     start.plates[0].modes = [0.0; 7];
     let first = converged(&problem, start.clone(), &TIGHT);
@@ -437,7 +437,7 @@ fn fixed_columns_do_not_move() {
     start.cameras[0].parameters[0] += 2.0;
     let fixed =
         |n: &str| n.contains("joint_3") || n.ends_with(".fx") || n.starts_with("hand_camera") || n.ends_with("skew");
-    problem.layout.set_free(false, fixed);
+    hold(&mut problem.layout, fixed);
     let outcome = converged(&problem, start.clone(), &Settings::default());
     let (before, after) = (start.values(&problem.layout), outcome.adjustment.state.values(&problem.layout));
     let mut moved = 0;

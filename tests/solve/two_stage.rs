@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::support::small::{Dice, Request, problem, series};
+use crate::support::small::{Dice, Request, hold, problem, series};
 use nalgebra::Vector3;
 use robotcal::assess::{Limits, folds, regions};
 use robotcal::identify::{
@@ -37,7 +37,7 @@ fn full_covariance_relinearised_at_the_hard_joint_solution_is_the_hard_joint_fit
         let (mut problem, state) = problem(&mut dice, &request);
         // A gross error keeps Huber's weights in play, a fixed column the bookkeeping.
         problem.images[2].observations[3].uv.y += 2.0;
-        problem.layout.set_free(false, |n| n.ends_with("joint_2/origin.rz"));
+        hold(&mut problem.layout, |n| n.ends_with("joint_2/origin.rz"));
         let joint = solved(&problem, hard(&state));
         let stage = PoseStage::linearised(&joint).unwrap();
         let (step, two_stage) = linear_step(&joint, &stage, 0.0).unwrap();

@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod by_poses;
+pub mod couplings;
 pub mod dense;
 pub mod displaced;
 pub mod flange;

@@ -21,6 +21,11 @@ use robotcal::urdf::{CarriedMass, Chain, Drive, Joint, JointKind};
 const WIDTH_PX: u32 = 1280;
 const HEIGHT_PX: u32 = 1024;
 
+/// Holds the columns whose name fulfils `which`.
+pub fn hold(layout: &mut Layout, which: impl Fn(&str) -> bool) {
+    layout.columns.iter_mut().filter(|c| which(&c.name)).for_each(|c| c.free = false);
+}
+
 /// Random numbers of a printed seed.
 pub struct Dice(ChaCha8Rng);
 

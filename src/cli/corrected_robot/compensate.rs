@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
-use super::compensate_frames::{Choice, Side, Sides, known_error, solution};
+use super::compensate_frames::{Choice, Side, Sides, Solutions, known_error};
 use super::compensate_models::{corrected_already, equal, exchanged, not_given};
 use super::controller_base::controller_base;
 use crate::cli::Verdict;
@@ -143,8 +143,9 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
         program.heed_no_codes();
     }
     let choice = Choice::read(args.frames.as_deref(), args.from_frames.as_deref(), &sides)?;
-    let framed = choice.framed(&sides)?;
-    let frames = choice.measured(&sides, language, &setting)?;
+    let solutions = choice.solutions(&sides)?;
+    let framed = choice.framed(&solutions)?;
+    let frames = choice.measured(&solutions, language, &setting)?;
     let models = Models {
         controller,
         from: robots.from.as_ref().unwrap_or(controller),
@@ -155,8 +156,8 @@ pub fn run(args: &CompensateArgs) -> Result<Verdict> {
     let done = programs::compensate(&program, models, &postures(args, &controller.chain, &axes)?);
     done.tell_what_moves(&mut program);
     let left = done.left(&program);
-    let (expected, meant) = (choice.expected(&sides, &framed, &program, &done)?, choice.meant());
-    let mut findings = model_findings(args, nominal, &models, (&sides, &choice))?;
+    let (expected, meant) = (choice.expected((&sides, &solutions), &framed, &program, &done)?, choice.meant());
+    let mut findings = model_findings(args, nominal, &models, (&sides, &solutions))?;
     findings.extend(in_other_base(args, nominal, (language, &program), &controller.chain)?);
     let said = expected.as_deref().map_err(|why| why.as_str());
     findings.extend(program_findings(args, (&program, &done, &left), (said, &meant)));
@@ -300,7 +301,7 @@ fn model_findings(
     args: &CompensateArgs,
     nominal: &Path,
     models: &Models<'_>,
-    (sides, choice): (&Sides, &Choice),
+    (sides, solutions): (&Sides, &Solutions),
 ) -> Result<Vec<FileFinding>> {
     let mut findings = Vec::new();
     findings.extend(models.frames.is_none().then(|| equal(models.from, sides)).flatten());
@@ -308,10 +309,10 @@ fn model_findings(
     if sides.from.is_none() {
         findings.extend(exchanged(models.controller, nominal, sides)?);
     }
-    let of_sides = [(Some(&sides.to), false), (sides.from.as_ref(), true)];
-    for (side, is_taught) in of_sides.into_iter().filter_map(|(side, is_taught)| Some((side?, is_taught))) {
-        let record = solution(side, choice.recorded(is_taught))?.ok();
-        findings.extend(record.and_then(|record| untrusted(&record, Weight::Gate, side.urdf.display())));
+    let of_sides = [(Some(&sides.to), Some(&solutions.to)), (sides.from.as_ref(), solutions.from.as_ref())];
+    for (side, found) in of_sides.into_iter().filter_map(|(side, found)| side.zip(found)) {
+        let record = found.as_ref().ok();
+        findings.extend(record.and_then(|record| untrusted(record, Weight::Gate, side.urdf.display())));
     }
     findings.extend(not_given(&sides.to, args.compensation.as_deref(), "--compensation"));
     let taught = sides.from.as_ref();
@@ -489,33 +490,42 @@ fn frame(flag: &str, text: Option<&str>, language: Language) -> Result<Option<Po
 /// Targets listed one by one on the terminal; more only by their largest corrections.
 const SHOWN: usize = 10;
 
+/// A target by its number, with what was corrected of it.
+type Done<'a> = (usize, &'a Correction);
+
 fn text(program: &Program, outcomes: &[TargetOutcome], left: &[Left], chain: &Chain) -> String {
-    let mut done: Vec<(usize, &Correction)> = outcomes
+    let done: Vec<Done> = outcomes
         .iter()
         .enumerate()
         .filter_map(|(k, o)| if let TargetOutcome::Done(c) = o { Some((k, c)) } else { None })
         .collect();
+    let targets = format!("targets   {} rewritten, {} unchanged\n", done.len(), left.len());
+    let sizes = if done.is_empty() { String::new() } else { sizes(&done) };
+    let notices: String = program.notices.iter().map(|notice| format!("note      {}\n", notice.coded())).collect();
+    [targets, sizes, largest(done, program, chain), notices, left_as_they_are(left, program)].concat()
+}
+
+/// How large the corrections are, and what rounding leaves.
+fn sizes(done: &[Done]) -> String {
     let rms = |of: fn(&Correction) -> f64| {
         1e3 * (done.iter().map(|(_, c)| of(c).powi(2)).sum::<f64>() / done.len().max(1) as f64).sqrt()
     };
     let worst = |of: fn(&Correction) -> f64| done.iter().map(|(_, c)| of(c)).fold(0.0, f64::max);
-    let mut out = format!("targets   {} rewritten, {} unchanged\n", done.len(), left.len());
-    if !done.is_empty() {
-        let _ = writeln!(
-            out,
-            "correction {:.3} mm and {:.3} mrad RMS, at most {:.3} mm and {:.3} mrad",
-            rms(|c| c.shift_m),
-            rms(|c| c.turn_rad),
-            1e3 * worst(|c| c.shift_m),
-            1e3 * worst(|c| c.turn_rad)
-        );
-        let _ = writeln!(
-            out,
-            "rounding  the numbers as written give these joints to {:.1e} m and {:.1e} rad; how accurate the robot is with them is said below",
-            worst(|c| c.residual_m),
-            worst(|c| c.residual_rad)
-        );
-    }
+    format!(
+        "correction {:.3} mm and {:.3} mrad RMS, at most {:.3} mm and {:.3} mrad\n\
+         rounding  the numbers as written give these joints to {:.1e} m and {:.1e} rad; how accurate the robot is with them is said below\n",
+        rms(|c| c.shift_m),
+        rms(|c| c.turn_rad),
+        1e3 * worst(|c| c.shift_m),
+        1e3 * worst(|c| c.turn_rad),
+        worst(|c| c.residual_m),
+        worst(|c| c.residual_rad)
+    )
+}
+
+/// Every correction; of many the largest.
+fn largest(mut done: Vec<Done>, program: &Program, chain: &Chain) -> String {
+    let mut out = String::new();
     if done.len() > SHOWN {
         let _ = writeln!(out, "largest   {SHOWN} of {} (all in {TABLE}):", done.len());
         done.sort_by(|a, b| b.1.shift_m.total_cmp(&a.1.shift_m));
@@ -536,9 +546,12 @@ fn text(program: &Program, outcomes: &[TargetOutcome], left: &[Left], chain: &Ch
             t.line, t.name, chain.readings[joint]
         );
     }
-    for notice in &program.notices {
-        let _ = writeln!(out, "note      {}", notice.coded());
-    }
+    out
+}
+
+/// Targets that are not rewritten, each with the reason; of many with one reason the first.
+fn left_as_they_are(left: &[Left], program: &Program) -> String {
+    let mut out = String::new();
     let mut told: BTreeMap<&str, usize> = BTreeMap::new();
     for l in left {
         let count = told.entry(&l.why.words).or_default();

@@ -61,12 +61,21 @@ pub(super) enum NoSolution {
 
 impl NoSolution {
     /// In words.
-    fn why(self) -> String {
+    fn why(&self) -> String {
         match self {
-            Self::Absent(why) => why,
+            Self::Absent(why) => why.clone(),
             Self::OfOther(error) | Self::Unusable(error) => format!("{} {}; {}", error.place, error.what, error.remedy),
         }
     }
+}
+
+/// The solution from which a description came, or why it is not at hand.
+type Found = std::result::Result<SolutionRecord, NoSolution>;
+
+/// Those of both robots.
+pub(super) struct Solutions {
+    pub to: Found,
+    pub from: Option<Found>,
 }
 
 fn read_frames(path: &Path, side: &Side) -> Result<FramesRecord> {
@@ -133,8 +142,20 @@ impl Choice {
         Ok(())
     }
 
+    /// The solutions from which the descriptions came: as given, beside them, or those with which measured frames were found.
+    ///
+    /// # Errors
+    /// One that was given and cannot be used, or is of another robot.
+    pub fn solutions(&self, sides: &Sides) -> Result<Solutions> {
+        let of_from = |side: &Side| solution(side, self.recorded(true));
+        Ok(Solutions {
+            to: solution(&sides.to, self.recorded(false))?,
+            from: sides.from.as_ref().map(of_from).transpose()?,
+        })
+    }
+
     /// Where the solutions are with which measured frames of a side were found.
-    pub fn recorded(&self, is_taught: bool) -> Option<&Path> {
+    fn recorded(&self, is_taught: bool) -> Option<&Path> {
         let Self::Measured { to, from } = self else { return None };
         let record = if is_taught { from.as_deref() } else { Some(to.as_ref()) };
         Some(&record?.robot.solution.path)
@@ -143,18 +164,18 @@ impl Choice {
     /// What takes the place of the program's own frames.
     ///
     /// # Errors
-    /// As of [`Choice::framed`].
+    /// A solution beside the description that cannot be used.
     pub fn measured(
         &self,
-        sides: &Sides,
+        solutions: &Solutions,
         language: Language,
         setting: &ProgramSetting,
     ) -> Result<Option<MeasuredFrames>> {
         let Self::Measured { to, from } = self else { return Ok(None) };
         // Those with which the frames were found.
-        let limits = match solution(&sides.to, Some(&to.robot.solution.path))? {
+        let limits = match &solutions.to {
             Ok(record) => record.limits(),
-            Err(NoSolution::Unusable(error)) => return Err(error),
+            Err(NoSolution::Unusable(error)) => return Err(error.clone()),
             Err(_) => Limits::default(),
         };
         Ok(Some(MeasuredFrames {
@@ -198,13 +219,13 @@ impl Choice {
     }
 
     /// The robots with their measured frames; else why what is known of them is not at hand.
-    pub fn framed(&self, sides: &Sides) -> Result<Known<Vec<FramedRobot>>> {
+    pub fn framed(&self, solutions: &Solutions) -> Result<Known<Vec<FramedRobot>>> {
         let Self::Measured { to, from } = self else { return Ok(Ok(Vec::new())) };
         let mut all = Vec::new();
-        let both = [(Some(&sides.to), Some(to), false), (sides.from.as_ref(), from.as_ref(), true)];
-        for (side, record, is_taught) in both {
-            let (Some(side), Some(record)) = (side, record) else { continue };
-            match framed(side, record, is_taught)? {
+        let both = [(Some(&solutions.to), Some(to), false), (solutions.from.as_ref(), from.as_ref(), true)];
+        for (solution, record, is_taught) in both {
+            let (Some(solution), Some(record)) = (solution, record) else { continue };
+            match framed(solution, record, is_taught)? {
                 Ok(robot) => all.push(robot),
                 Err(why) => return Ok(Err(why)),
             }
@@ -215,7 +236,7 @@ impl Choice {
     /// Expected error of every target, m; else why it is not known.
     pub fn expected(
         &self,
-        sides: &Sides,
+        (sides, solutions): (&Sides, &Solutions),
         framed: &Known<Vec<FramedRobot>>,
         program: &Program,
         done: &Compensated,
@@ -226,10 +247,10 @@ impl Choice {
                 .map(|all| corrections::expected_with_frames(program, done, all))
                 .map_err(Clone::clone)),
             (_, Some(_)) => Ok(Err("base and tool of both robots count, and no common frame is given".into())),
-            (_, None) => Ok(match solution(&sides.to, None)? {
+            (_, None) => Ok(match &solutions.to {
                 Ok(record) => {
-                    let part = part(&record, sides.to.robot);
-                    Ok(corrections::expected_errors(program, done, &exported_model(&record)?, part))
+                    let part = part(record, sides.to.robot);
+                    Ok(corrections::expected_errors(program, done, &exported_model(record)?, part))
                 }
                 Err(none) => Err(none.why()),
             }),
@@ -253,9 +274,9 @@ fn frames_of(record: &FramesRecord) -> RobotFrames {
     RobotFrames { tool, work: record.work.as_ref().map(|w| (&w.pose).into()) }
 }
 
-fn framed(side: &Side, record: &FramesRecord, is_taught: bool) -> Result<Known<FramedRobot>> {
-    let found = match solution(side, Some(&record.robot.solution.path))? {
-        Ok(solution) => exported_model(&solution)?,
+fn framed(solution: &Found, record: &FramesRecord, is_taught: bool) -> Result<Known<FramedRobot>> {
+    let found = match solution {
+        Ok(solution) => exported_model(solution)?,
         Err(none) => return Ok(Err(none.why())),
     };
     let (robot, knowledge) = record.known(&found)?;
@@ -267,10 +288,7 @@ fn framed(side: &Side, record: &FramesRecord, is_taught: bool) -> Result<Known<F
 ///
 /// # Errors
 /// One that was given and cannot be used, or is of another robot.
-pub(super) fn solution(
-    side: &Side,
-    recorded: Option<&Path>,
-) -> Result<std::result::Result<SolutionRecord, NoSolution>> {
+pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Found> {
     let beside = side.urdf.with_file_name(solution_json::FILE_NAME);
     let there = [Some(beside.as_path()), recorded].into_iter().flatten().find(|p| p.is_file());
     let Some(path) = side.solution.or(there) else {

@@ -1,5 +1,6 @@
 //! `robotcal frames`: tool and work object of a robot that was identified, from touches.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -16,7 +17,6 @@ use crate::diagnose::Weight;
 use crate::error::{Code, Error, Notice, Result, closest_name};
 use crate::frames::{self, AsStated, FrameFit, Given, KnownRobot, TouchPlace, Touches, fit};
 use crate::geom::{Pose, matrix_from_rpy};
-
 use crate::identify::{NamedSeries, leave_out_repeated_bodies, measure_bodies, mirror_image, touch_mistake};
 use crate::output::corrections::{FileFinding, untrusted};
 use crate::output::frame_files::{self, Frames, Named};
@@ -113,23 +113,15 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     let of_controller = Frames { work, ..frames.clone() };
     findings.extend(is_carried);
     findings.extend(untrusted(&record, Weight::Gate, args.from.display()));
-    let robot_record = RobotOfFrames {
-        solution: InputFile::of_file(&args.from)?,
-        name: record.robot.name.clone(),
-        base: record.robot.base.clone(),
-        tip: record.robot.tip.clone(),
-        checks: checks(&robot),
-    };
+    let robot_record = robot_record(args, &record, &robot)?;
     let made = FramesRecord {
         inputs: files.into_iter().chain(plans).collect(),
         tool: tool_told.then(|| tool_record(args, &record, &fitted, &touches)),
         findings: findings.clone(),
         ..record_of((&fitted, &touches), robot_record, placement)
     };
-    let mut files = frame_files::files(&of_controller);
-    let urdf = corrected_urdf(&record, &found, &in_the_base(&frames, &record, &fitted))?;
-    files.insert(format!("{}.frames.urdf", folder_name(std::slice::from_ref(&record.robot.name))), urdf.into_bytes());
-    files.insert(FILE_NAME.into(), frames_record::to_bytes(&made)?);
+    let in_base = in_the_base(&frames, &record, &fitted);
+    let files = files_of((&of_controller, &in_base), &made, (&record, &found))?;
     let listed: Vec<(String, &[u8])> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
     place.write_beside(&listed, std::slice::from_ref(&args.from))?;
     say!("{}", text(&args.from, &made, &fitted, &touches, &robot));
@@ -141,6 +133,19 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     say::findings(&findings);
     say_line!("results   {} ({})", args.out.display(), files.keys().cloned().collect::<Vec<_>>().join(", "));
     Ok(if findings.iter().all(|f| f.weight == Weight::Note) { Verdict::Good } else { Verdict::GateFailed })
+}
+
+/// The result by the names of its files: the frames as the controller takes them, the URDF with those in its base, and what was made.
+fn files_of(
+    (of_controller, in_base): (&Frames, &Frames),
+    made: &FramesRecord,
+    (record, found): (&SolutionRecord, &FoundModel),
+) -> Result<BTreeMap<String, Vec<u8>>> {
+    let mut files = frame_files::files(of_controller);
+    let urdf = corrected_urdf(record, found, in_base)?;
+    files.insert(format!("{}.frames.urdf", folder_name(std::slice::from_ref(&record.robot.name))), urdf.into_bytes());
+    files.insert(FILE_NAME.into(), frames_record::to_bytes(made)?);
+    Ok(files)
 }
 
 /// How many touches were brought to where the markers were found, and how far, m.
@@ -380,6 +385,17 @@ fn work_name(touches: &Touches) -> String {
     let name = touches.frame.as_deref().unwrap_or(UNNAMED);
     // What places are called whose frame `[contact]` does not name.
     if name == "contact" { UNNAMED.to_owned() } else { name.to_owned() }
+}
+
+/// The robot of the frames, by the solution that it comes from.
+fn robot_record(args: &FramesArgs, record: &SolutionRecord, robot: &KnownRobot) -> Result<RobotOfFrames> {
+    Ok(RobotOfFrames {
+        solution: InputFile::of_file(&args.from)?,
+        name: record.robot.name.clone(),
+        base: record.robot.base.clone(),
+        tip: record.robot.tip.clone(),
+        checks: checks(robot),
+    })
 }
 
 /// What was fitted, without inputs, tool and findings.

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 
 use crate::frames::{FrameFit, KnownRobot, Touches};
 use crate::geom::Pose;
+use crate::linalg::dense;
 use crate::output::frame_findings::at_the_places;
 use crate::output::frames_record::{FILE_NAME, FramesRecord, ToolKind, WorkKind};
 
@@ -124,7 +125,7 @@ fn work_rows(out: &mut String, made: &FramesRecord, fit: &FrameFit, touches: &To
                 )?;
             } else {
                 let (c, _) = at_the_places(c, touches);
-                let c = DMatrix::from_column_slice(6, 6, c.as_slice());
+                let c = dense(&c);
                 writeln!(
                     out,
                     "          sigma {} mm in the middle of the places, {} mrad about its axes",

@@ -5,12 +5,10 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::compensate_frames::Side;
-use super::compensate_models::not_given;
 use super::verify_args::VerifyArgs;
+use super::verify_model::Model;
 use super::verify_points::{Laid, apart, of_another_size, open};
 use super::verify_series;
-use super::verify_stated::Stated;
 use super::verify_verdict::{Gain, Measured, Reasons};
 use crate::assess::{
     Limits, MeasuredPoint, PointFit, ReadingMistake, bootstrap_ratio, by_cluster, fit_points, reading_mistake,
@@ -82,70 +80,77 @@ impl Judged {
 }
 
 fn points(args: &VerifyArgs, file: &Path, unit: Unit) -> Result<Verdict> {
-    let model = judged(args, (&args.urdf, args.compensation.as_deref()), (file, unit))?;
-    let (stated, of_other) = Stated::beside(&args.urdf, &model.robot)?;
-    let limits = &Stated::limits_of(stated.as_ref());
+    let as_read = judged(args, (&args.urdf, args.compensation.as_deref()), (file, unit))?;
+    let model = Model::of(as_read.robot.clone(), &args.urdf)?;
+    let (stated, limits) = (model.stated.as_ref(), &model.limits);
     let device_m = point_sigma(args.point_sigma_m, limits)?;
-    let zeros = args.readings.beside(stated.as_ref(), &args.urdf, &[])?;
-    let model = match &zeros {
-        Some(zeros) => model.with_added(&zeros.missing, file)?,
-        None => model,
+    let zeros = args.readings.beside(stated, &args.urdf, &[])?;
+    let of_model = match &zeros {
+        Some(zeros) => as_read.with_added(&zeros.missing, file)?,
+        None => as_read,
     };
-    refuse_mistaken(&model, &args.urdf, file, limits)?;
-    refuse_far(&model, &args.urdf, file, limits)?;
-    let count = model.points.len();
+    refuse_mistaken(&of_model, &args.urdf, file, limits)?;
+    refuse_far(&of_model, &args.urdf, file, limits)?;
+    let count = of_model.points.len();
     let exact = if stated.is_some() && args.point_sigma_m.is_none() { EXACT } else { "" };
     say_line!("points    {count} of {}; frame of the device and reflector fitted{exact}", file.display());
     zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
-    say_line!("{}", line("model", &args.urdf, &model));
+    say_line!("{}", line("model", &args.urdf, &of_model));
     let nominal = args.nominal.as_ref().map(|urdf| {
         let nominal = judged(args, (urdf, None), (file, unit))?;
         refuse_far(&nominal, urdf, file, limits)?;
         say_line!("{}", line("nominal", urdf, &nominal));
         Ok(nominal)
     });
-    let nominal = nominal.transpose()?;
-    let expected = stated.as_ref().and_then(|s| s.at_points(&model.points, device_m));
+    let mut reasons = weigh((&args.urdf, &model), (&of_model, file, device_m), nominal.transpose()?.as_ref());
+    reasons.findings.extend(model.doubts(&args.urdf, args.compensation.as_deref()));
+    Ok(reasons.verdict())
+}
+
+/// The model beside what its solution states at the points, which scatter by the device, m per axis.
+fn weigh(
+    (urdf, model): (&Path, &Model),
+    (judged, file, device_m): (&Judged, &Path, f64),
+    nominal: Option<&Judged>,
+) -> Reasons {
+    let (stated, limits) = (model.stated.as_ref(), &model.limits);
+    let expected_of = |points: &[MeasuredPoint]| stated.and_then(|s| s.at_points(points, device_m));
+    let expected = expected_of(&judged.points);
     let mut reasons = Reasons::default();
-    let (is_moved, wrong) = apart(model.laid(), expected.as_ref(), limits, &mut reasons);
-    // Wrong points are none of the robot's errors.
-    let without = (!wrong.is_empty()).then(|| model.without(&wrong)).flatten();
-    let rms_m = without.as_ref().map_or(model.fit.rms_m, |others| others.fit.rms_m);
-    let different = model.different();
+    let (is_moved, wrong) = apart(judged.laid(), expected.as_ref(), limits, &mut reasons);
+    let different = judged.different();
     if is_moved {
         reasons.against.push("the points do not belong together".into());
-    } else if different < limits.scatter_images {
+        return reasons;
+    }
+    if different < limits.scatter_images {
         reasons.against.push(format!(
             "{different} different points, of which frame and reflector take up nine of {} values: measure {} or more",
             3 * different,
             limits.scatter_images
         ));
-    } else {
-        let gain = nominal.as_ref().and_then(|nominal| gain(&model, nominal, &wrong));
-        if nominal.is_some() && gain.is_none() {
-            reasons.against.push("the nominal model leaves nothing".into());
-        }
-        let expected = match &without {
-            Some(others) => stated.as_ref().and_then(|s| s.at_points(&others.points, device_m)),
-            None => expected,
-        };
-        let stated_here = stated.as_ref().zip(expected.map(|expected| expected.all));
-        let is_stated = stated_here.is_some();
-        reasons.add(&Measured { urdf: &args.urdf, rms_m, stated: stated_here, gain }, limits);
-        let judged = without.as_ref().unwrap_or(&model);
-        let is_bad = reasons.is_bad();
-        if reasons.misses() || !is_stated && rms_m > limits.displaced_m {
-            reasons.findings.extend(of_another_size(judged.laid(), file, limits));
-        }
-        if !is_bad {
-            reasons.findings.extend(open(judged.laid(), stated.as_ref(), file, limits));
-        }
+        return reasons;
     }
-    let side = Side { robot: &model.robot, urdf: &args.urdf, solution: None };
-    reasons.findings.extend(of_other);
-    reasons.findings.extend(stated.as_ref().and_then(|s| s.untrusted(&args.urdf)));
-    reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
-    Ok(reasons.verdict())
+    let gain = nominal.and_then(|nominal| gain(judged, nominal, &wrong));
+    if nominal.is_some() && gain.is_none() {
+        reasons.against.push("the nominal model leaves nothing".into());
+    }
+    // Wrong points are none of the robot's errors.
+    let without = (!wrong.is_empty()).then(|| judged.without(&wrong)).flatten();
+    let expected = without.as_ref().map_or(expected, |others| expected_of(&others.points));
+    let judged = without.as_ref().unwrap_or(judged);
+    let rms_m = judged.fit.rms_m;
+    let stated_here = stated.zip(expected.map(|expected| expected.all));
+    let is_stated = stated_here.is_some();
+    reasons.add(&Measured { urdf, rms_m, stated: stated_here, gain }, limits);
+    let is_bad = reasons.is_bad();
+    if reasons.misses() || !is_stated && rms_m > limits.displaced_m {
+        reasons.findings.extend(of_another_size(judged.laid(), file, limits));
+    }
+    if !is_bad {
+        reasons.findings.extend(open(judged.laid(), stated, file, limits));
+    }
+    reasons
 }
 
 /// As stated; nothing where it is not.

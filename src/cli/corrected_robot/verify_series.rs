@@ -4,9 +4,8 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::compensate_frames::Side;
-use super::compensate_models::not_given;
 use super::verify_args::VerifyArgs;
+use super::verify_model::Model;
 use super::verify_stated::Stated;
 use super::verify_verdict::{Gain, Measured, Reasons, of_series};
 use super::verify_zeros::{read_otherwise, words, zero_off};
@@ -17,11 +16,11 @@ use crate::cli::Verdict;
 use crate::cli::flags::recording::RecordingArgs;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::say::say_line;
-use crate::diagnose::{Finding, PlateSize, Weight};
+use crate::diagnose::{Finding, SizeDifference, Weight};
 use crate::error::{Code, Error, Result};
 use crate::identify::{
-    JudgedByImages, JudgedImage, JudgedSeries, Options, RobotModel, RobotOfOtherZeros, Selection, identify,
-    in_told_postures, postures_are_computed, verify_series,
+    JudgedImage, JudgedSeries, Options, RobotModel, RobotOfOtherZeros, Selection, identify, in_told_postures,
+    postures_are_computed, verify_series,
 };
 use crate::model::robot::Robot;
 use crate::output::compensated;
@@ -40,59 +39,47 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let Some(file) = &args.nominal else {
         let inputs = judged_inputs.with_recordings(&options)?;
         require_readings(&inputs)?;
-        let model = Model::of(args, inputs.chain.clone())?;
+        let model = model(args, inputs.chain.clone())?;
         let Observed { series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
         let zeros = zeros(args, &model, &files)?;
         let seen =
             Verified { series: &with_added(series, &missing(zeros.as_ref())), files: &files, zeros: zeros.as_ref() };
-        let JudgedByImages { images, sizes } = match judged((&model.robot, &args.urdf), seen.series, &model.limits)? {
-            JudgedSeries::Images(judged) => judged,
+        let found = match judged((&model.robot, &args.urdf), seen.series, &model.limits)? {
+            JudgedSeries::Images(found) => found,
             JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
         };
-        let images: Vec<&JudgedImage> = images.iter().collect();
+        let images: Vec<&JudgedImage> = found.images.iter().collect();
         say_line!("{}", line("model", &args.urdf, &images));
-        return Ok(weigh(args, &model, (&seen, &images, &sizes), None).verdict());
+        return Ok(weigh(args, &model, (&seen, &images, &found.plate_sizes()), None).verdict());
     };
     // Poses of a controller are those of the model that is in it, whichever robot is judged by them.
     let nominal_inputs = read(file)?;
     require_same_joints(&judged_inputs.chain, &nominal_inputs.chain, &args.urdf, file)?;
-    let model = Model::of(args, judged_inputs.chain)?;
+    let model = model(args, judged_inputs.chain)?;
     let Observed { chain, series, files, .. } =
         nominal_inputs.with_recordings(&options)?.observe(&model.limits, &progress::of_series())?;
     let zeros = zeros(args, &model, &files)?;
     let missing = missing(zeros.as_ref());
     let series = in_told_postures(&model.robot, &with_added(series, &missing), &model.limits);
     let seen = Verified { series: &series, files: &files, zeros: zeros.as_ref() };
-    let JudgedByImages { images, sizes } = match judged((&model.robot, &args.urdf), &series, &model.limits)? {
-        JudgedSeries::Images(judged) => judged,
+    let found = match judged((&model.robot, &args.urdf), &series, &model.limits)? {
+        JudgedSeries::Images(found) => found,
         JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
     };
     let as_shown: Vec<f64> = missing.iter().map(|offset| -offset).collect();
     let (robot, nominal) =
         compared((Robot::nominal(chain), file), &with_added(series.clone(), &as_shown), &model.limits)?;
-    let (images, nominal) = of_both(&images, &nominal);
+    let (images, nominal) = of_both(&found.images, &nominal);
     let ratio = compare(args, file, &images, &nominal)?;
     let gain = Gain { ratio, nominal: &robot, of: "images", at: at_images(&model.robot, &series) };
-    Ok(weigh(args, &model, (&seen, &images, &sizes), Some(gain)).verdict())
+    Ok(weigh(args, &model, (&seen, &images, &found.plate_sizes()), Some(gain)).verdict())
 }
 
-/// What is judged, with what its solution states and the limits with which that was found.
-struct Model {
-    robot: Robot,
-    stated: Option<Stated>,
-    /// Said where the solution beside it is of another description.
-    of_other: Option<FileFinding>,
-    limits: Limits,
-}
-
-impl Model {
-    fn of(args: &VerifyArgs, chain: Chain) -> Result<Self> {
-        let robot = compensated(chain, args.compensation.as_deref())?;
-        let (stated, of_other) = Stated::beside(&args.urdf, &robot)?;
-        // A flag that means nothing is refused before images are read.
-        args.readings.beside(stated.as_ref(), &args.urdf, &[])?;
-        Ok(Self { limits: Stated::limits_of(stated.as_ref()), stated, of_other, robot })
-    }
+/// The model of the flags. One of them that means nothing is refused before images are read.
+fn model(args: &VerifyArgs, chain: Chain) -> Result<Model> {
+    let model = Model::of(compensated(chain, args.compensation.as_deref())?, &args.urdf)?;
+    args.readings.beside(model.stated.as_ref(), &args.urdf, &[])?;
+    Ok(model)
 }
 
 /// Which controller readings are of; says so.
@@ -127,10 +114,10 @@ struct Verified<'a> {
 fn weigh(
     args: &VerifyArgs,
     model: &Model,
-    (seen, images, sizes): (&Verified<'_>, &[&JudgedImage], &[PlateSize]),
+    (seen, images, sizes): (&Verified<'_>, &[&JudgedImage], &[(String, SizeDifference)]),
     gain: Option<Gain<'_>>,
 ) -> Reasons {
-    let Model { robot, stated, of_other, limits } = model;
+    let Model { robot, stated, limits, .. } = model;
     let urdf = &args.urdf;
     let expected = stated.as_ref().and_then(|s| Some((s, s.at_stops(seen.series)?)));
     let rms_m = 1e-3 * root_mean_square(&units(images));
@@ -141,10 +128,7 @@ fn weigh(
         reasons.add_own(urdf, stated);
     }
     reasons.findings.extend(sizes.iter().filter_map(|size| of_another_size(size, model, (urdf, seen.series))));
-    let side = Side { robot, urdf, solution: None };
-    reasons.findings.extend(of_other.clone());
-    reasons.findings.extend(stated.as_ref().and_then(|s| s.untrusted(urdf)));
-    reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
+    reasons.findings.extend(model.doubts(urdf, args.compensation.as_deref()));
     if reasons.misses() || is_unexplained {
         match by_other_readings(urdf, model, seen) {
             Some(found) => reasons.findings.push(found),
@@ -154,13 +138,16 @@ fn weigh(
     reasons
 }
 
-/// A plate that the model contradicts: its lengths are as wrong as the size of the plate, and no image shows it.
-fn of_another_size(size: &PlateSize, model: &Model, (urdf, series): (&Path, &[MeasuredSeries])) -> Option<FileFinding> {
-    let PlateSize { plate, off, .. } = size;
+/// A plate that the model contradicts: its lengths are as wrong as the size of the plate, and the errors of the images hold a part of that at most.
+fn of_another_size(
+    (plate, SizeDifference { off, sigma }): &(String, SizeDifference),
+    model: &Model,
+    (urdf, series): (&Path, &[MeasuredSeries]),
+) -> Option<FileFinding> {
     // Lengths of which nothing is stated may be off as those of robots are.
     let stated = model.stated.as_ref().and_then(Stated::size_sigma);
     let weight = if stated.is_some() { Weight::Gate } else { Weight::Note };
-    let sigma = size.sigma.hypot(stated.unwrap_or_default());
+    let sigma = sigma.hypot(stated.unwrap_or_default());
     let is_off = off.abs() > model.limits.plate_size_sigmas * sigma;
     if !is_off {
         return None;
@@ -200,10 +187,7 @@ fn of_other_zeros(args: &VerifyArgs, model: &Model, seen: &Verified<'_>, other: 
         Some(found) => reasons.findings.push(found),
         None => reasons.findings.extend(other.zeros.iter().map(|zero| zero_off(zero, &subject))),
     }
-    let side = Side { robot: &model.robot, urdf, solution: None };
-    reasons.findings.extend(model.of_other.clone());
-    reasons.findings.extend(model.stated.as_ref().and_then(|s| s.untrusted(urdf)));
-    reasons.findings.extend(not_given(&side, args.compensation.as_deref(), "--compensation"));
+    reasons.findings.extend(model.doubts(urdf, args.compensation.as_deref()));
     Ok(reasons)
 }
 

@@ -70,9 +70,9 @@ impl Stated {
         Ok((Some(Self { path, record, found, part }), None))
     }
 
-    /// Those with which the solution was judged; where none stands beside a description, the usual ones.
-    pub fn limits_of(stated: Option<&Self>) -> Limits {
-        stated.map_or_else(Limits::default, |s| s.found.limits)
+    /// Those with which the solution was judged.
+    pub fn limits(&self) -> Limits {
+        self.found.limits
     }
 
     /// At the stops of series: markers as far from the flange as what stands still is.

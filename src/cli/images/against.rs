@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::geom::Pose;
-use crate::identify::{OtherBody, PoseComparison, StandAlone, compare_poses};
+use crate::identify::{OtherBody, PoseComparison, PoseDifference, StandAlone, compare_poses};
 use crate::series::read_named_poses;
 use crate::simulate::truth::Truth;
 
@@ -25,7 +25,7 @@ pub(super) fn compare(found: &StandAlone, path: &Path) -> Result<PoseComparison>
 /// What is printed.
 pub(super) fn text(path: &Path, c: &PoseComparison) -> String {
     let arcmin = |rad: f64| 60.0 * rad.to_degrees();
-    let length = |d: &crate::identify::PoseDifference| d.twist.fixed_rows::<3>(0).norm();
+    let length = |d: &PoseDifference| d.twist.fixed_rows::<3>(0).norm();
     let worst = c.differences.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
     let worst = worst.map_or_else(String::new, |w| {
         let turn = w.twist.fixed_rows::<3>(3).norm();

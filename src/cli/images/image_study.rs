@@ -1,6 +1,6 @@
 //! `robotcal detect --study`: the report on what the image stage reaches on rendered pictures.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::{Args, ValueEnum};
 
@@ -16,8 +16,8 @@ use crate::study::image_stage::tables::{
     REPORT, Section, bias_section, identity_section, image_study_files, precision_section,
 };
 use crate::study::image_stage::{
-    Bias, Identity, IdentityRequest, Plates, Precision, bias, bias_cases, identity, identity_view, precision,
-    precision_cells,
+    Bias, Identity, IdentityRequest, IdentityView, Plates, Precision, bias, bias_cases, identity, identity_view,
+    precision, precision_cells,
 };
 
 /// Flags of the study.
@@ -149,12 +149,12 @@ fn run_identity(args: &StudyArgs) -> Result<Identity> {
 fn failed_views(study: &Identity) -> Result<Vec<Drawn>> {
     let only = study.views.len() == 1;
     let plates = Plates::standard()?;
-    let missed = |v: &&crate::study::image_stage::IdentityView| only || v.failed() || v.found < v.visible;
+    let missed = |v: &&IdentityView| only || v.failed() || v.found < v.visible;
     let drawn = study.views.iter().filter(missed).take(DRAWN).map(|view| {
         let (_, picture, detection) = identity_view(&plates, view.seed);
         let name = format!("view-{}.png", view.seed);
         let size = Some((picture.width, picture.height));
-        let image = SeenImage { name: name.clone(), path: None::<PathBuf>, size, detection };
+        let image = SeenImage { name: name.clone(), path: None, size, detection };
         let palette = Palette::of(std::slice::from_ref(&image));
         Ok((name, overlay_png(&picture, &image, plates.own(), &palette)?))
     });

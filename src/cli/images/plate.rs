@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use sha2::{Digest, Sha256};
 
-use super::plate_board::{self, BoardArgs, BoardSize, Kind};
+use super::plate_board::{self, BoardArgs, BoardRequest, Kind};
 use crate::cli::Verdict;
 use crate::cli::flags::arguments::pair;
 use crate::cli::terminal::say::say;
@@ -69,7 +69,7 @@ fn sheet(text: &str) -> std::result::Result<Sheet, String> {
 pub fn run(args: &PlateArgs) -> Result<Verdict> {
     let place = ResultFolder::among(&args.out)?;
     if args.board.kind != Kind::CodedCircles {
-        let size = BoardSize {
+        let size = BoardRequest {
             shape: args.shape,
             pitch_mm: args.pitch_mm,
             sheet: args.sheet,

@@ -72,8 +72,8 @@ pub(super) struct BoardArgs {
     large: Vec<[u32; 2]>,
 }
 
-/// Size of what is drawn.
-pub(super) struct BoardSize {
+/// What is drawn, and on what.
+pub(super) struct BoardRequest {
     pub shape: Option<[u32; 2]>,
     pub pitch_mm: Option<f64>,
     pub sheet: Option<Sheet>,
@@ -88,7 +88,7 @@ const LARGER: f64 = 1.5;
 ///
 /// # Errors
 /// What the reader of plate.toml says; a board that the sheet does not hold.
-pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &BoardSize) -> Result<()> {
+pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &BoardRequest) -> Result<()> {
     let plate = plate(args, size)?;
     regions(&plate)?;
     let sheet = size.sheet.unwrap_or_else(|| Sheet::fitting(&plate));
@@ -127,7 +127,7 @@ pub(super) fn draw(place: &ResultFolder, out: &Path, args: &BoardArgs, size: &Bo
 }
 
 /// The plate that the flags describe, by way of the text of its plate.toml.
-fn plate(args: &BoardArgs, size: &BoardSize) -> Result<Plate> {
+fn plate(args: &BoardArgs, size: &BoardRequest) -> Result<Plate> {
     let has_ids = matches!(args.kind, Kind::Charuco | Kind::Aprilgrid | Kind::ArucoGrid | Kind::Tag);
     if args.id != 0 && !has_ids {
         let what = format!("is not of --kind {}", kind_name(args.kind));
@@ -164,7 +164,7 @@ struct PlateText {
 
 impl PlateText {
     /// The text; an error names all flags that are lacking.
-    fn of(args: &BoardArgs, size: &BoardSize) -> Result<String> {
+    fn of(args: &BoardArgs, size: &BoardRequest) -> Result<String> {
         let mut made = Self::default();
         made.key("format", 1);
         made.key("kind", quoted(&kind_name(args.kind)));

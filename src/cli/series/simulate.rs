@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 
 use crate::cli::Verdict;
 use crate::cli::flags::camera_args::lens;
+use crate::cli::flags::joint_table::Unit;
 use crate::cli::flags::robot::read_chain;
 use crate::cli::terminal::progress;
 use crate::cli::terminal::say::{say, say_line};
@@ -13,7 +14,7 @@ use crate::error::{Code, Error, Result};
 use crate::output::NewFolder;
 use crate::plan::plate_design::{PlateRequest, design};
 use crate::plan::viewpoint::ViewRange;
-use crate::series::{AngleUnit, CameraMount, Edge, Plate, read_plate};
+use crate::series::{CameraMount, Edge, Plate, read_plate};
 use crate::simulate::conditions::ImagingConditions;
 use crate::simulate::faults::{FAULTS, Fault};
 use crate::simulate::folder::{Content, write};
@@ -112,12 +113,6 @@ pub struct SimulateArgs {
 pub(super) enum Mount {
     Hand,
     Fixed,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Unit {
-    Rad,
-    Deg,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -245,10 +240,7 @@ fn request(args: &SimulateArgs) -> Result<WorldRequest> {
         least_markers: args.least_markers,
         postures: None,
         held_out: args.held_out,
-        joint_unit: match args.joint_unit {
-            Unit::Rad => AngleUnit::Rad,
-            Unit::Deg => AngleUnit::Deg,
-        },
+        joint_unit: args.joint_unit.into(),
         seed: args.seed,
         ..WorldRequest::typical(chain, plate(args)?)
     })

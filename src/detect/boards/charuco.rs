@@ -8,7 +8,7 @@ use calib_targets_chessboard::ChessCorner;
 use super::charuco_markers::{Marker, Print, decode, prints, rare_prints};
 use super::charuco_numbers::{Contradiction, Counting, contradiction};
 use super::charuco_placed::placed;
-use super::charuco_seen::{Seen, elsewhere, ids, instead, side_seen};
+use super::charuco_seen::{MarkersSeen, elsewhere, ids, instead, side_seen};
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
 use super::lattices::Sorted;
@@ -16,7 +16,7 @@ use super::sizes::{best_of_sizes, on_picture, shows_most};
 use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 use crate::detect::corners::{Window, measure};
 use crate::detect::pictures::bytes::Bytes;
-use crate::detect::shared::KEEP_OFF_PX;
+use crate::detect::shared::{KEEP_OFF_PX, mirrored};
 use crate::detect::size_seen::twin;
 use crate::detect::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
@@ -60,7 +60,7 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let Some(found) = found else {
         bytes.mirror();
         if at_scale(&bytes, 1.0, Sought { prints: &prints, board, least, cells_of: None })?.is_some() {
-            return Err(mirrored_board());
+            return Err(mirrored("the board is mirrored"));
         }
         return Err(elsewhere(picture, plate).map_or_else(|| no_board(plate), |seen| other_board(plate, &seen)));
     };
@@ -307,7 +307,7 @@ fn no_board(plate: &Plate) -> Error {
     Error::new(Code::PlateNotFound, "image", not_found(plate), remedy)
 }
 
-fn other_board(plate: &Plate, seen: &Seen) -> Error {
+fn other_board(plate: &Plate, seen: &MarkersSeen) -> Error {
     let mut differs = Vec::new();
     if seen.dictionary_differs(plate) {
         differs.push(format!("the markers are those of {}", seen.dictionary));
@@ -397,13 +397,4 @@ fn either_layout() -> Error {
         "the markers in view fit into both of OpenCV's layouts, a column apart: which corner is which cannot be told";
     let remedy = "write dictionary, side_m and legacy (true for the layout before 4.6) under [aruco] in the plate file";
     Error::new(Code::PlateIncomplete, "image", what, remedy)
-}
-
-fn mirrored_board() -> Error {
-    Error::new(
-        Code::PlateMirrored,
-        "image",
-        "the board is mirrored",
-        "turn off mirroring in the camera or in the image export",
-    )
 }

@@ -19,7 +19,7 @@ const ALIKE: f64 = 0.06;
 
 /// What the markers of the picture say.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen {
+pub struct MarkersSeen {
     pub dictionary: &'static str,
     /// Inner corners in a row.
     pub columns: Option<u32>,
@@ -34,7 +34,7 @@ pub struct Seen {
     pairs: usize,
 }
 
-impl Seen {
+impl MarkersSeen {
     fn of(picture: &Picture, passes: &[Vec<Quad>], dictionary: Dictionary) -> Self {
         let print = TagPrint::Opencv;
         let tags = Tags { dictionary: dictionary.name().to_owned(), print, side_m: 1.0, gap_m: 0.0, first_id: 0 };
@@ -90,17 +90,17 @@ fn stated(plate: &Plate) -> Option<Dictionary> {
 }
 
 /// The board that most markers agree with, where it is another one.
-pub fn instead(picture: &Picture, plate: &Plate) -> Option<Seen> {
+pub fn instead(picture: &Picture, plate: &Plate) -> Option<MarkersSeen> {
     seen(picture, plate).filter(|best| !best.is(plate))
 }
 
 /// The same, or the stated board with some numbers that it has not.
-pub fn elsewhere(picture: &Picture, plate: &Plate) -> Option<Seen> {
-    let has_others = |seen: &Seen| seen.ids.iter().any(|id| !ids(plate).contains(id));
+pub fn elsewhere(picture: &Picture, plate: &Plate) -> Option<MarkersSeen> {
+    let has_others = |seen: &MarkersSeen| seen.ids.iter().any(|id| !ids(plate).contains(id));
     seen(picture, plate).filter(|best| !best.is(plate) || has_others(best))
 }
 
-fn seen(picture: &Picture, plate: &Plate) -> Option<Seen> {
+fn seen(picture: &Picture, plate: &Plate) -> Option<MarkersSeen> {
     let passes: Vec<Vec<Quad>> = passes(picture).collect();
     agreed(picture, &passes, stated(plate).into_iter().chain(usual_dictionaries()))
 }
@@ -108,12 +108,16 @@ fn seen(picture: &Picture, plate: &Plate) -> Option<Seen> {
 /// Side of the markers over that of a square, as their contours tell it, or else as they are read.
 pub fn side_seen(picture: &Picture, print: &Print) -> f64 {
     let passes: Vec<Vec<Quad>> = passes(picture).collect();
-    Seen::of(picture, &passes, print.dictionary).side.unwrap_or(print.ratio)
+    MarkersSeen::of(picture, &passes, print.dictionary).side.unwrap_or(print.ratio)
 }
 
 /// The board that most markers agree with, of these dictionaries.
-pub fn agreed(picture: &Picture, passes: &[Vec<Quad>], dictionaries: impl Iterator<Item = Dictionary>) -> Option<Seen> {
-    let all = dictionaries.map(|dictionary| Seen::of(picture, passes, dictionary));
+pub fn agreed(
+    picture: &Picture,
+    passes: &[Vec<Quad>],
+    dictionaries: impl Iterator<Item = Dictionary>,
+) -> Option<MarkersSeen> {
+    let all = dictionaries.map(|dictionary| MarkersSeen::of(picture, passes, dictionary));
     // The first of equals.
     let best = all.reduce(|best, other| if other.pairs > best.pairs { other } else { best })?;
     (best.pairs >= LEAST_PAIRS).then_some(best)

@@ -17,7 +17,7 @@ use crate::detect::circles::{FALSE_ALARMS, binomial_tail};
 use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 use crate::detect::corners::{Window, measure};
 use crate::detect::pictures::bytes::Bytes;
-use crate::detect::shared::KEEP_OFF_PX;
+use crate::detect::shared::{KEEP_OFF_PX, mirrored};
 use crate::detect::{Detection, Dropped, Outline, Picture};
 use crate::error::{Code, Error, Result};
 use crate::series::{Next, Plate, Puzzle};
@@ -48,7 +48,7 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
             return Err(elsewhere(&found, [0, 0]));
         }
         bytes.mirror();
-        return Err(if look(&bytes)?.is_some() { mirrored() } else { nothing(plate) });
+        return Err(if look(&bytes)?.is_some() { mirrored("the board is mirrored") } else { nothing(plate) });
     };
     let (lattice, dropped) = Dots { picture, puzzle, lattice: &lattice }.checked();
     let beyond = lattice.keys().filter(|key| !board.contains(**key)).count();
@@ -193,14 +193,5 @@ fn elsewhere(lattice: &Lattice, origin: [i32; 2]) -> Error {
              origin_col = {column}"
         ),
         "check columns, rows (inner corners), origin_row and origin_col of the plate file, or whether it is the right board",
-    )
-}
-
-fn mirrored() -> Error {
-    Error::new(
-        Code::PlateMirrored,
-        "image",
-        "the board is mirrored",
-        "turn off mirroring in the camera or in the image export",
     )
 }

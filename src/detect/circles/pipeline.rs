@@ -11,7 +11,7 @@ use super::ellipse::Ellipse;
 use super::identity::code::{MarkerCode, Verdict};
 use super::identity::lattice::{Apart, Buckets, Cell, Lattice, lattices};
 use super::identity::neighbour_check::{Board, Placed, around, check_neighbours, continuation, neighbourhood};
-use super::measuring::agreement::{Inner, Seen, agreement};
+use super::measuring::agreement::{Inner, MeasuredMarker, agreement};
 use super::measuring::bands::Bands;
 use super::measuring::glare::allow_for_glare;
 use super::measuring::measure::{Camera, THRESHOLD, Target, drop_target, learn, target_of};
@@ -387,7 +387,7 @@ impl Work<'_> {
 
     /// Drops annuli whose inner and outer centre do not agree.
     fn agree(&self, entries: &mut Vec<Entry>, dropped: &mut Vec<DroppedCandidate>) -> Option<InnerOuter> {
-        let seen: Vec<Seen> = entries.iter().filter_map(|e| self.seen(e)).collect();
+        let seen: Vec<MeasuredMarker> = entries.iter().filter_map(|e| self.seen(e)).collect();
         if seen.len() != entries.len() {
             return None;
         }
@@ -410,7 +410,7 @@ impl Work<'_> {
         summary
     }
 
-    fn seen(&self, entry: &Entry) -> Option<Seen> {
+    fn seen(&self, entry: &Entry) -> Option<MeasuredMarker> {
         let marker = self.marker(entry.cell)?;
         let (measured, cross) = (&entry.fit.measured, entry.fit.cross);
         let inner = measured.inner.map(|i| {
@@ -420,7 +420,7 @@ impl Work<'_> {
             Inner { radius: marker.inner_radius_m / self.plate.pitch_m, centre: i.ellipse.centre, sigma }
         });
         let outer_radius = marker.outer_radius_m / self.plate.pitch_m;
-        Some(Seen { cell: entry.cell, outer_radius, outer: measured.outer.ellipse.centre, inner })
+        Some(MeasuredMarker { cell: entry.cell, outer_radius, outer: measured.outer.ellipse.centre, inner })
     }
 
     fn detection(

@@ -15,13 +15,13 @@
 //! sigma^2 L = sum_l c(l) / (1 - sum_l h(l))
 //! ```
 //!
-//! Windows of few pixels need more than that: [`Seen::unfollowed`].
+//! Windows of few pixels need more than that: [`LagProducts::unfollowed`].
 
 use nalgebra::Matrix2;
 
 use super::fit::Saddle;
 use super::model::PARAMETERS;
-use crate::detect::correlated::{Correlation, LAGS, NONE, OddPart, Raster, Residuals, Seen, sound};
+use crate::detect::correlated::{Correlation, LAGS, LagProducts, NONE, OddPart, Raster, Residuals, sound};
 use crate::detect::shared::SYSTEMATIC_PX;
 
 /// Where a fit follows more than this share of noise that reaches over all lags, its residuals say nothing about it.
@@ -34,12 +34,12 @@ const LEAST_PIXELS: f64 = 100.0;
 /// Of the residuals of fitted corners in a picture that was smoothed so, if at all.
 pub(super) fn correlation(corners: &[&Saddle], smoothing_px: Option<f64>) -> Correlation {
     let parts: Vec<OddPart> = corners.iter().map(|corner| OddPart::of(residuals(corner), corner.uv)).collect();
-    let (mut seen, mut followed) = (Seen::NOTHING, [0.0; LAGS]);
+    let (mut seen, mut followed) = (LagProducts::NOTHING, [0.0; LAGS]);
     for (corner, part) in corners.iter().zip(&parts) {
         part.add_to(&mut seen, 1.0 / (corner.noise * corner.noise).max(f64::MIN_POSITIVE));
         part.add_followed(&mut followed);
     }
-    let Seen { products, counts } = &seen;
+    let LagProducts { products, counts } = &seen;
     let mean = |sums: &[f64; LAGS], lag: usize| if counts[lag] > 0.0 { sums[lag] / counts[lag] } else { 0.0 };
     let means =
         |sums: &[f64; LAGS]| Correlation(std::array::from_fn(|lag| if lag < NONE { 0.0 } else { mean(sums, lag) }));

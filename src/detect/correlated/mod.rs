@@ -14,4 +14,4 @@ mod unfollowed;
 pub use correlation::Correlation;
 pub(super) use correlation::sound;
 pub(super) use raster::{LAGS, NONE, Raster};
-pub(super) use residuals::{OddPart, Residuals, Seen};
+pub(super) use residuals::{LagProducts, OddPart, Residuals};

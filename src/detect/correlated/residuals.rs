@@ -8,6 +8,7 @@ use super::raster::{LAGS, NONE, Raster};
 pub(in crate::detect) struct Residuals {
     /// Column and row of every pixel.
     pub at: Vec<[i32; 2]>,
+    /// Of every pixel: counts, or in units of the noise, as the fit has them.
     pub values: Vec<f64>,
     /// Columns `U`, a value a pixel: `U U'` has the derivatives of fitted values by pixel values.
     pub followed: Vec<Vec<f64>>,
@@ -38,7 +39,7 @@ impl OddPart {
     }
 
     /// Adds the products of every two values, times `scale`.
-    pub fn add_to(&self, seen: &mut Seen, scale: f64) {
+    pub fn add_to(&self, seen: &mut LagProducts, scale: f64) {
         let raster = Raster::new(&self.odd.at);
         raster.add_products(&mut seen.products, scale, &raster.plane(|k| self.odd.values[k]));
         raster.add_products(&mut seen.counts, 1.0, &raster.plane(|_| 1.0));
@@ -53,14 +54,14 @@ impl OddPart {
 
 /// Sums over the pairs of pixels at every lag.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::detect) struct Seen {
+pub(in crate::detect) struct LagProducts {
     /// Products of residuals.
     pub products: [f64; LAGS],
     /// How many.
     pub counts: [f64; LAGS],
 }
 
-impl Seen {
+impl LagProducts {
     pub const NOTHING: Self = Self { products: [0.0; LAGS], counts: [0.0; LAGS] };
 
     /// Adds those of other pixels.

@@ -2,7 +2,7 @@
 
 use super::correlation::Correlation;
 use super::raster::{NONE, UNKNOWN};
-use super::residuals::{OddPart, Seen};
+use super::residuals::{LagProducts, OddPart};
 use super::response::{Lags, Response, Sums};
 
 /// By how much a correlation may differ from what was expected, one sigma.
@@ -10,7 +10,7 @@ const UNEXPECTED: f64 = 0.5;
 /// Squares, in units of their uncertainty, up to which what was seen counts nothing ([`Unfollowed::shrunk`]).
 const NOTHING: f64 = UNKNOWN as f64 - 2.0;
 
-impl Seen {
+impl LagProducts {
     /// The noise that left such residuals; `parts` are some of those that did, which are much alike. `None` where the equations have no solution.
     pub fn unfollowed<'a>(
         &self,

@@ -14,6 +14,7 @@ use super::scan::{certain, corners, passes, read_pass, scan};
 use super::seen::{MEASURED, contradiction, gap_contradiction, instead};
 use crate::detect::circles::{smoothed, variance_factor};
 use crate::detect::detection::smoothed_notice;
+use crate::detect::shared::mirrored;
 use crate::detect::{Detection, Dropped, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::geom::PlaneMap;
@@ -392,7 +393,7 @@ impl<'a> Board<'a> {
         let quads: Vec<Vec<Quad>> = passes(self.picture).collect();
         let reflected = scan(self.picture, &self.reader, &quads, true);
         if !certain(&self.reader, &reflected, SURE_BITS).is_empty() {
-            return mirrored();
+            return mirrored("the tags are mirrored");
         }
         instead(self.picture, self.plate, self.tags, &quads).unwrap_or_else(|| nothing(self.tags))
     }
@@ -494,14 +495,5 @@ pub fn unseen_line(plate: &Plate) -> Notice {
             if plate.tags.is_some() { "tags" } else { "inner corners" }
         ),
         "if nothing covers it, the board is smaller: correct columns and rows of the plate file, in whose middle its frame is",
-    )
-}
-
-fn mirrored() -> Error {
-    Error::new(
-        Code::PlateMirrored,
-        "image",
-        "the tags are mirrored",
-        "turn off mirroring in the camera or in the image export",
     )
 }

@@ -25,12 +25,13 @@ pub struct ExchangedReadings {
 /// Every circle once, and once for all cameras that saw its stops.
 pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedReadings> {
     let problem = &adjustment.problem;
+    let circles = ReadingCircles::of(problem);
     let mut found: Vec<ExchangedReadings> = Vec::new();
-    for (first, image) in problem.images.iter().enumerate() {
-        let Some(circle) = circle_from(problem, first) else { continue };
+    for (first, image) in problem.images.iter().enumerate().filter(|(k, _)| circles.contain(*k)) {
         if found.iter().any(|f| f.images.contains(&image.name)) {
             continue;
         }
+        let circle = circles.beginning_with(first);
         let of_circle = |i: &&Image| circle.iter().any(|&(k, _)| problem.images[k].stop == i.stop);
         let is_measured = |&(k, _): &(usize, f64)| problem.is_measured_at(problem.images[k].stop);
         found.push(ExchangedReadings {
@@ -44,16 +45,51 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedRe
     found
 }
 
-/// Wrongly paired images from one to the one whose readings it fits, with how well, until the first is met again.
-pub(super) fn circle_from(problem: &Problem, first: usize) -> Option<Vec<(usize, f64)>> {
-    let mut circle: Vec<(usize, f64)> = Vec::new();
-    let mut at = first;
-    while !circle.iter().any(|&(i, _)| i == at) {
-        let (next, misfit) = whose_readings_fit(problem, at)?;
-        circle.push((at, misfit));
-        at = next;
+/// Wrongly paired images that fit the readings of each other in circles.
+pub(super) struct ReadingCircles {
+    /// For every image of a circle the one whose readings it fits, with how well; none for others.
+    next: Vec<Option<(usize, f64)>>,
+}
+
+impl ReadingCircles {
+    pub fn of(problem: &Problem) -> Self {
+        let fits: Vec<Option<(usize, f64)>> =
+            (0..problem.images.len()).map(|image| whose_readings_fit(problem, image)).collect();
+        let mut next = vec![None; fits.len()];
+        let mut is_met = vec![false; fits.len()];
+        for first in 0..fits.len() {
+            let (mut way, mut at) = (Vec::new(), first);
+            while !is_met[at]
+                && let Some((other, _)) = fits[at]
+            {
+                is_met[at] = true;
+                way.push(at);
+                at = other;
+            }
+            // A way that comes back to one of its own images ends in a circle.
+            let back_at = way.iter().position(|image| *image == at);
+            way.iter().skip(back_at.unwrap_or(way.len())).for_each(|image| next[*image] = fits[*image]);
+        }
+        Self { next }
     }
-    (at == first).then_some(circle)
+
+    pub fn contain(&self, image: usize) -> bool {
+        self.next[image].is_some()
+    }
+
+    /// The images of a circle from one of them on, each with how well it fits the readings of the next, the last those of the first.
+    fn beginning_with(&self, first: usize) -> Vec<(usize, f64)> {
+        let mut circle = Vec::new();
+        let mut at = first;
+        while let Some((next, misfit)) = self.next[at] {
+            circle.push((at, misfit));
+            at = next;
+            if at == first {
+                break;
+            }
+        }
+        circle
+    }
 }
 
 /// The image of whose readings a wrongly paired one is, and how well it fits them.

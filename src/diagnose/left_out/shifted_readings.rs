@@ -1,6 +1,6 @@
 //! Do images that were left out one after the other fit the readings of their neighbours?
 
-use super::exchanged_readings::{circle_from, whose_readings_fit};
+use super::exchanged_readings::{ReadingCircles, whose_readings_fit};
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::problem::{Adjustment, Problem};
@@ -23,12 +23,13 @@ pub struct ShiftedReadings {
 /// Every run once; of several cameras at the same stops that of the first.
 pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ShiftedReadings> {
     let problem = &adjustment.problem;
+    let circles = ReadingCircles::of(problem);
     let mut found: Vec<(Vec<usize>, ShiftedReadings)> = Vec::new();
     for camera in 0..problem.cameras.len() {
         let of_camera: Vec<usize> = (0..problem.images.len()).filter(|&i| problem.images[i].camera == camera).collect();
         for below in [true, false] {
             let all: Vec<Option<f64>> =
-                (0..of_camera.len()).map(|k| fits_neighbour(problem, &of_camera, k, below)).collect();
+                (0..of_camera.len()).map(|k| fits_neighbour((problem, &circles), &of_camera, k, below)).collect();
             let places: Vec<usize> = (0..all.len()).collect();
             let runs = places.chunk_by(|a, b| all[*a].is_some() && all[*b].is_some());
             for run in runs.filter(|run| run.len() >= setting.limits.moved_images) {
@@ -54,11 +55,16 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ShiftedRead
 
 /// How well an image that was left out fits the readings of its neighbour among those of its camera; `None` where it does not, or where readings were
 /// exchanged in a circle.
-fn fits_neighbour(problem: &Problem, of_camera: &[usize], place: usize, below: bool) -> Option<f64> {
+fn fits_neighbour(
+    (problem, circles): (&Problem, &ReadingCircles),
+    of_camera: &[usize],
+    place: usize,
+    below: bool,
+) -> Option<f64> {
     let image = of_camera[place];
     let (other, misfit) = whose_readings_fit(problem, image)?;
     let neighbour = if below { of_camera.get(place + 1) } else { of_camera.get(place.checked_sub(1)?) };
-    (neighbour == Some(&other) && circle_from(problem, image).is_none()).then_some(misfit)
+    (neighbour == Some(&other) && !circles.contain(image)).then_some(misfit)
 }
 
 impl ShiftedReadings {

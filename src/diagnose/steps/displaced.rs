@@ -129,6 +129,75 @@ impl Displaced {
         }
     }
 
+    /// How far it is elsewhere, with the sigmas.
+    fn size(&self) -> String {
+        let (far, far_sigma) = (1e3 * self.distance_m.0, 1e3 * self.distance_m.1);
+        match self.angle_rad {
+            Some((angle, sigma)) => format!(
+                "{far:.2} mm, {:.2} mrad (sigma at most {far_sigma:.2} mm, {:.2} mrad per axis)",
+                1e3 * angle,
+                1e3 * sigma
+            ),
+            None => format!("{far:.2} mm (sigma at most {far_sigma:.2} mm per axis)"),
+        }
+    }
+
+    /// What else than that it was moved looks the same.
+    fn what_else(&self) -> String {
+        match self.body {
+            Carried::Camera | Carried::CameraInHand => ", creeps, or its lens was touched".to_owned(),
+            Carried::Fixture => format!(" with {}, or the base of the robot", self.places.join(", ")),
+            Carried::FixtureOfSome => ", or the base of the robot".to_owned(),
+            _ => ", or creeps".to_owned(),
+        }
+    }
+
+    /// Where it is elsewhere from one image or stop on.
+    fn remedy_from_then_on(&self) -> String {
+        match self.body {
+            Carried::Camera | Carried::CameraInHand => format!(
+                "fasten the camera, and take the series again, or put the images from {} on into a series of their own with the same [camera] name and another mounting",
+                self.first()
+            ),
+            Carried::Plate | Carried::PlateInHand => format!(
+                "write a column placement in joints.csv that differs from {} on, or fasten the plate and take the series again",
+                self.first()
+            ),
+            Carried::Instrument => format!(
+                "put the stops from {} on into a series of their own with another [tracker] name, or measure again",
+                self.first()
+            ),
+            Carried::Places => format!(
+                "put the stops from {} on into a series of their own with another [contact] frame, or measure again",
+                self.first()
+            ),
+            Carried::Socket => format!(
+                "give contact {} another name from {} on, or fasten the socket and measure again",
+                self.places.join(", "),
+                self.first()
+            ),
+            Carried::Target => format!(
+                "give the target another name from {} on (of contacts, put them into a series of their own), or fasten it and measure again",
+                self.first()
+            ),
+            Carried::Bracket => format!(
+                "give all targets other names from {} on, or fasten their bracket and measure again",
+                self.first()
+            ),
+            Carried::Fixture => {
+                format!(
+                    "give all contacts other names from {} on, or fasten the fixture and measure again",
+                    self.first()
+                )
+            }
+            Carried::FixtureOfSome => format!(
+                "give contacts {} other names from {} on, or fasten them and measure again",
+                self.places.join(", "),
+                self.first()
+            ),
+        }
+    }
+
     /// Where it is elsewhere in one of several series.
     fn remedy_between_series(&self) -> String {
         match self.body {
@@ -199,30 +268,17 @@ impl Kind for Displaced {
             Carried::Socket | Carried::FixtureOfSome => format!("{} {}", self.body(), self.places.join(", ")),
             _ => self.body().to_owned(),
         };
-        let (far, far_sigma) = (1e3 * self.distance_m.0, 1e3 * self.distance_m.1);
-        let size = match self.angle_rad {
-            Some((angle, sigma)) => format!(
-                "{far:.2} mm, {:.2} mrad (sigma at most {far_sigma:.2} mm, {:.2} mrad per axis)",
-                1e3 * angle,
-                1e3 * sigma
-            ),
-            None => format!("{far:.2} mm (sigma at most {far_sigma:.2} mm per axis)"),
-        };
+        let size = self.size();
         let what = match self.displacement {
             Displacement::FromThenOn => {
                 let stands = match self.body {
                     Carried::PlateInHand | Carried::CameraInHand | Carried::Target | Carried::Bracket => "sits",
                     _ => "stands",
                 };
-                let touched = match self.body {
-                    Carried::Camera | Carried::CameraInHand => ", creeps, or its lens was touched".to_owned(),
-                    Carried::Fixture => format!(" with {}, or the base of the robot", self.places.join(", ")),
-                    Carried::FixtureOfSome => ", or the base of the robot".to_owned(),
-                    _ => ", or creeps".to_owned(),
-                };
                 format!(
-                    "from {} on the {body} {stands} {size} elsewhere than before: it was moved{touched}",
-                    self.first()
+                    "from {} on the {body} {stands} {size} elsewhere than before: it was moved{}",
+                    self.first(),
+                    self.what_else()
                 )
             }
             Displacement::AxisUp(axis) => format!(
@@ -251,48 +307,7 @@ impl Kind for Displaced {
 
     fn remedy(&self) -> String {
         match self.displacement {
-            Displacement::FromThenOn => match self.body {
-                Carried::Camera | Carried::CameraInHand => format!(
-                    "fasten the camera, and take the series again, or put the images from {} on into a series of their own with the same [camera] name and another mounting",
-                    self.first()
-                ),
-                Carried::Plate | Carried::PlateInHand => format!(
-                    "write a column placement in joints.csv that differs from {} on, or fasten the plate and take the series again",
-                    self.first()
-                ),
-                Carried::Instrument => format!(
-                    "put the stops from {} on into a series of their own with another [tracker] name, or measure again",
-                    self.first()
-                ),
-                Carried::Places => format!(
-                    "put the stops from {} on into a series of their own with another [contact] frame, or measure again",
-                    self.first()
-                ),
-                Carried::Socket => format!(
-                    "give contact {} another name from {} on, or fasten the socket and measure again",
-                    self.places.join(", "),
-                    self.first()
-                ),
-                Carried::Target => format!(
-                    "give the target another name from {} on (of contacts, put them into a series of their own), or fasten it and measure again",
-                    self.first()
-                ),
-                Carried::Bracket => format!(
-                    "give all targets other names from {} on, or fasten their bracket and measure again",
-                    self.first()
-                ),
-                Carried::Fixture => {
-                    format!(
-                        "give all contacts other names from {} on, or fasten the fixture and measure again",
-                        self.first()
-                    )
-                }
-                Carried::FixtureOfSome => format!(
-                    "give contacts {} other names from {} on, or fasten them and measure again",
-                    self.places.join(", "),
-                    self.first()
-                ),
-            },
+            Displacement::FromThenOn => self.remedy_from_then_on(),
             Displacement::InAll => self.remedy_between_series(),
             Displacement::ByTurns => {
                 "give the rows of each place a placement of their own in joints.csv, or fasten it and take the series again".into()

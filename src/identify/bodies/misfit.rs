@@ -10,7 +10,7 @@ use crate::problem::{BodyMeasurement, BodySeen, Problem};
 pub(super) const FEWEST_POSES: usize = 3;
 
 /// What an instrument saw of a body, and the readings at its stop.
-pub(super) struct SeenAt {
+pub(super) struct BodyAtStop {
     /// The instrument, by its index.
     pub instrument: usize,
     /// The stop, by its index.
@@ -21,7 +21,7 @@ pub(super) struct SeenAt {
     pub readings: Vec<f64>,
 }
 
-impl SeenAt {
+impl BodyAtStop {
     /// A measurement; `None` off the robot.
     pub fn of(problem: &Problem, measured: &BodyMeasurement) -> Option<Self> {
         let BodyMeasurement { instrument, stop, seen, .. } = *measured;
@@ -36,9 +36,9 @@ impl SeenAt {
 }
 
 /// Median misfit of the poses (rad + m), or of the points (m), with readings.
-pub(super) fn usual_misfit(robot: &Robot, seen: &[SeenAt]) -> f64 {
+pub(super) fn usual_misfit(robot: &Robot, seen: &[BodyAtStop]) -> f64 {
     let tips: Vec<Pose> = seen.iter().map(|s| robot.base_from_tip(&s.readings)).collect();
-    let pair = |(seen, tip): (&SeenAt, &Pose)| match seen.seen {
+    let pair = |(seen, tip): (&BodyAtStop, &Pose)| match seen.seen {
         BodySeen::Pose(pose) => Some(PosePair { camera_from_plate: pose, chain: *tip }),
         BodySeen::Point(_) => None,
     };

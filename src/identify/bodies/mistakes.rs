@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::misfit::{FEWEST_POSES, SeenAt};
+use super::misfit::{BodyAtStop, FEWEST_POSES};
 use super::points_start::FEWEST_POINTS;
 use super::rows_of::{rows_of_bodies, table};
 use crate::assess::Limits;
@@ -21,7 +21,7 @@ use crate::model::robot::Robot;
 use crate::problem::{Adjustment, BodyMeasurement, BodySeen, InstrumentKind, Problem};
 
 /// What was seen with a mistake undone, and its name.
-type Undone = (Vec<SeenAt>, MistakeKind);
+type Undone = (Vec<BodyAtStop>, MistakeKind);
 
 /// Refuses measurements and readings that fit with one of the usual mistakes undone, and only then.
 ///
@@ -31,7 +31,7 @@ pub(super) fn name_mistake(
     adjustment: &Adjustment,
     measured: &[usize],
     limits: &Limits,
-    misfit: impl Fn(&Robot, &[SeenAt]) -> f64 + Sync,
+    misfit: impl Fn(&Robot, &[BodyAtStop]) -> f64 + Sync,
 ) -> Result<()> {
     mistake(adjustment, measured, limits, misfit).map_or(Ok(()), |mistake| Err(Finding::from(mistake).refusal()))
 }
@@ -42,12 +42,12 @@ pub(super) fn mistake(
     adjustment: &Adjustment,
     measured: &[usize],
     limits: &Limits,
-    misfit: impl Fn(&Robot, &[SeenAt]) -> f64 + Sync,
+    misfit: impl Fn(&Robot, &[BodyAtStop]) -> f64 + Sync,
 ) -> Option<Mistake> {
     let Adjustment { problem, state } = adjustment;
     let robot = &state.robot;
-    let mut given: Vec<SeenAt> =
-        measured.iter().filter_map(|k| SeenAt::of(problem, &problem.body_measurements[*k])).collect();
+    let mut given: Vec<BodyAtStop> =
+        measured.iter().filter_map(|k| BodyAtStop::of(problem, &problem.body_measurements[*k])).collect();
     let of_all = misfit(robot, &given);
     let is_suspicious = of_all >= limits.suspicious_misfit;
     if !(is_suspicious || is_contradicted(problem, measured, of_all, limits))
@@ -60,20 +60,10 @@ pub(super) fn mistake(
         given = some_of(given.len()).map(|k| given[k].at(given[k].readings.clone())).collect();
     }
     let as_described = misfit(robot, &given);
-    let readings: Vec<Vec<f64>> = given.iter().map(|s| s.readings.clone()).collect();
-    let read_otherwise = all_misread().filter_map(|misread| {
-        let undone = |s: &SeenAt| Some(SeenAt { seen: misread.undone(s.seen)?, ..s.at(s.readings.clone()) });
-        Some((given.iter().map(undone).collect::<Option<Vec<_>>>()?, misread.kind()))
-    });
-    let signs = mirrored_signs_undone(robot, &readings, limits.suspicious_misfit);
-    let of_columns = columns_undone(robot, &readings).into_iter().chain(signs).map(|(readings, kind)| {
-        let undone = given.iter().zip(readings).map(|(s, readings)| s.at(readings));
-        (undone.collect(), kind)
-    });
-    let undone = read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, (&given, stops)));
     let instrument = &problem.instruments[given[0].instrument];
     let in_sockets = instrument.kind == InstrumentKind::Socket;
-    let undone: Vec<Undone> = undone.filter(|(_, kind)| !hardly_moves(kind) || is_suspicious).collect();
+    let mut undone = all_undone(problem, robot, (&given, stops), limits);
+    undone.retain(|(_, kind)| !hardly_moves(kind) || is_suspicious);
     // In sockets an arm that hardly moves fits without a cause: what is left counts by how far the tip moves.
     let slower = undone.iter().find(|(_, kind)| in_sockets && hardly_moves(kind));
     let slower = slower.map_or(1.0, |(undone, _)| tip_moves(robot, &given) / tip_moves(robot, undone));
@@ -97,6 +87,27 @@ pub(super) fn mistake(
     Some(Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of })
 }
 
+/// What was seen with each of the usual mistakes undone: of what the instrument wrote, of columns and signs, and of the rows of stops at which something
+/// was `measured`.
+fn all_undone(
+    problem: &Problem,
+    robot: &Robot,
+    (given, measured): (&[BodyAtStop], Vec<usize>),
+    limits: &Limits,
+) -> Vec<Undone> {
+    let readings: Vec<Vec<f64>> = given.iter().map(|s| s.readings.clone()).collect();
+    let read_otherwise = all_misread().filter_map(|misread| {
+        let undone = |s: &BodyAtStop| Some(BodyAtStop { seen: misread.undone(s.seen)?, ..s.at(s.readings.clone()) });
+        Some((given.iter().map(undone).collect::<Option<Vec<_>>>()?, misread.kind()))
+    });
+    let signs = mirrored_signs_undone(robot, &readings, limits.suspicious_misfit);
+    let of_columns = columns_undone(robot, &readings).into_iter().chain(signs).map(|(readings, kind)| {
+        let undone = given.iter().zip(readings).map(|(s, readings)| s.at(readings));
+        (undone.collect(), kind)
+    });
+    read_otherwise.chain(of_columns).chain(rows_undone(problem, robot, (given, measured))).collect()
+}
+
 /// True for a mistake without which the arm hardly moves: places that hardly differ do not tell it from one that turns about them.
 const fn hardly_moves(kind: &MistakeKind) -> bool {
     matches!(kind, MistakeKind::Unit { joint: None, are_degrees: true })
@@ -109,7 +120,7 @@ fn usually_apart(places: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) ->
 }
 
 /// The same of the tip, m.
-fn tip_moves(robot: &Robot, at: &[SeenAt]) -> f64 {
+fn tip_moves(robot: &Robot, at: &[BodyAtStop]) -> f64 {
     usually_apart(at.iter().map(|s| robot.base_from_tip(&s.readings).translation))
 }
 
@@ -125,7 +136,7 @@ fn is_contradicted(problem: &Problem, measured: &[usize], misfit: f64, limits: &
 
 /// What was seen, with the readings of the next stop, or the one before, in its series: of those in joints.csv, and of `measured`, all at which
 /// something was measured. A stop at the end has none.
-fn rows_undone(problem: &Problem, robot: &Robot, (given, measured): (&[SeenAt], Vec<usize>)) -> Vec<Undone> {
+fn rows_undone(problem: &Problem, robot: &Robot, (given, measured): (&[BodyAtStop], Vec<usize>)) -> Vec<Undone> {
     let all: Vec<usize> = (0..problem.stops.len()).collect();
     let orders = if measured.len() < all.len() { vec![all, measured] } else { vec![all] };
     // Few rows fit others by chance.
@@ -139,7 +150,7 @@ fn rows_undone(problem: &Problem, robot: &Robot, (given, measured): (&[SeenAt], 
             let is_near = other.series == problem.stops[s.stop].series;
             Some((s, other.posture.as_ref().filter(|_| is_near)?.readings.clone()))
         });
-        let (seen, shifted): (Vec<&SeenAt>, Vec<Vec<f64>>) = seen.unzip();
+        let (seen, shifted): (Vec<&BodyAtStop>, Vec<Vec<f64>>) = seen.unzip();
         if seen.len() < fewest {
             return Vec::new();
         }

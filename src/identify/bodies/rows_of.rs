@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::misfit::{SeenAt, usual_misfit};
+use super::misfit::{BodyAtStop, usual_misfit};
 use crate::assess::Limits;
 use crate::diagnose::RowsOf;
 use crate::init::{PosePair, hand_eye_misfit};
@@ -73,11 +73,11 @@ fn bodies_fit(
     (own, is_other): (&BTreeSet<usize>, impl Fn(&BodyMeasurement) -> bool),
     limits: &Limits,
 ) -> bool {
-    let mut groups: BTreeMap<(usize, usize), Vec<SeenAt>> = BTreeMap::new();
+    let mut groups: BTreeMap<(usize, usize), Vec<BodyAtStop>> = BTreeMap::new();
     for (_, measured) in problem.used_bodies() {
         let has_frame = problem.instruments[measured.instrument].kind != InstrumentKind::Socket;
         if has_frame && is_other(measured) {
-            groups.entry((measured.instrument, measured.body)).or_default().extend(SeenAt::of(problem, measured));
+            groups.entry((measured.instrument, measured.body)).or_default().extend(BodyAtStop::of(problem, measured));
         }
     }
     groups.values().any(|seen| {

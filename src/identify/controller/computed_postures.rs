@@ -29,7 +29,7 @@ use crate::identify::bodies::start::start_bodies;
 use crate::identify::photogrammetry::free_poses::free_poses_of;
 use crate::identify::problem::build::build;
 use crate::identify::start::robot::{StartGiven, start_robot};
-use crate::linalg::SymmetricFactor;
+use crate::linalg::{SymmetricFactor, dense};
 use crate::model::robot::{LinearOrigins, Posture, Robot};
 use crate::problem::{Adjustment, Chained, MeasuredSeries, Problem, State, TakenFrom};
 use crate::stage::stage;
@@ -144,7 +144,7 @@ impl Compared {
             let pose = self.free.poses[i].as_ref()?;
             let chained = state.chained_from(origins, &problem.layout, &problem.images[i], from())?;
             let e = (chained.pose.inverse() * pose.camera_from_plate).log();
-            let noise = DMatrix::from_column_slice(6, 6, pose.covariance.as_slice());
+            let noise = dense(&pose.covariance);
             self.whitened(&chained, DMatrix::identity(6, 6), (DVector::from_column_slice(e.as_slice()), noise))
         };
         let of_body = |&k: &usize| {

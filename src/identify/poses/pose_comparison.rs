@@ -19,7 +19,7 @@ use super::stand_alone::StandAlone;
 use crate::error::{Code, Error, Result};
 use crate::geom::{Pose, adjoint};
 use crate::init::{PosePair, solve_hand_eye};
-use crate::linalg::SymmetricFactor;
+use crate::linalg::{SymmetricFactor, dense};
 use crate::series::CameraMount;
 
 /// Rounds in which frames and sigmas settle.
@@ -163,10 +163,6 @@ fn gain(equations: &[Equation], sigmas: [f64; 2]) -> Option<Vec<DMatrix<f64>>> {
     Some(weighted.iter().map(|weighted| factor.solve_many(weighted)).collect())
 }
 
-fn dynamic(m: &Matrix6<f64>) -> DMatrix<f64> {
-    DMatrix::from_column_slice(6, 6, m.as_slice())
-}
-
 /// What the sum of `r' C^-1 r` is expected to be by the covariance of the poses `together`, of these images; of very many poses, by that of each.
 fn expected_squares(
     pairs: &[Pair],
@@ -178,14 +174,14 @@ fn expected_squares(
     let rows: Vec<Option<usize>> = pairs.iter().map(row).collect();
     let block = |a: usize, b: usize| match together.zip(rows[a].zip(rows[b])) {
         Some(((_, all), (row, column))) => all.view((6 * row, 6 * column), (6, 6)).into_owned(),
-        None if a == b => dynamic(&pairs[a].covariance),
+        None if a == b => dense(&pairs[a].covariance),
         None => DMatrix::zeros(6, 6),
     };
     let moved = |b: usize| -> DMatrix<f64> { gain.iter().enumerate().map(|(a, gain)| gain * block(a, b)).sum() };
     let moved: Vec<DMatrix<f64>> = (0..pairs.len()).map(moved).collect();
     let of_unknowns: DMatrix<f64> = moved.iter().zip(gain).map(|(moved, gain)| moved * gain.transpose()).sum();
     let of_pose = |(k, pair): (usize, &Pair)| {
-        let (information, j) = (dynamic(&pair.information?), &equations[k].1);
+        let (information, j) = (dense(&pair.information?), &equations[k].1);
         let own = (&information * block(k, k)).trace();
         let taken_up = (&information * (j * &moved[k])).trace();
         Some(own - 2.0 * taken_up + (information * (j * &of_unknowns * j.transpose())).trace())

@@ -47,26 +47,10 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
             stop.local_share = stop.posture.as_ref().map(|p| local_share(&robot.terms, p)).unwrap_or_default();
         }
     }
-    let state = State {
-        robot,
-        mountings: vec![Pose::identity(); pictured.mountings.len()],
-        placements: vec![Pose::identity(); pictured.placements.len()],
-        instruments: vec![Pose::identity(); bodies.instruments.len()],
-        bodies: vec![Pose::identity(); bodies.names.len()],
-        plates: pictured.plates.iter().map(PlateShape::nominal).collect(),
-        joint_errors: vec![Vec::new(); stops.len()],
-        ties: vec![Tie::Free(Pose::identity()); pictured.images.len()],
-        cameras: std::mem::take(&mut pictured.lenses),
-    };
+    let lenses = std::mem::take(&mut pictured.lenses);
+    let state = unknown_state(robot, (&pictured, lenses), &bodies, stops.len());
     let layout = layout(&state, series, &pictured, &bodies);
-    let noise = Noise {
-        pixel_factor: vec![1.0; pictured.cameras.len()],
-        joint: vec![vec![FIRST_JOINT_NOISE; readings]; runs],
-        local: first_local(&state, &layout),
-        displacement: Vec::new(),
-        marker: Vec::new(),
-        body: vec![[1.0; 2]; bodies.components],
-    };
+    let noise = first_noise(&state, &layout, runs, bodies.components);
     let families = (0..pictured.cameras.len()).filter_map(|k| Family::of_field(&layout, &state, k)).collect();
     let mut problem = Problem {
         layout,
@@ -91,6 +75,34 @@ pub fn build(robot: &Robot, series: &[MeasuredSeries], local_errors: bool, limit
     let sizes = if problem.tells_displacements().contains(&true) { DISPLACEMENT_SIZES } else { 1 };
     problem.noise.displacement = vec![FIRST_DISPLACEMENT; runs * sizes];
     Ok(Adjustment { problem, state })
+}
+
+/// The values before anything is known: poses are identities.
+fn unknown_state(robot: Robot, (pictured, cameras): (&Pictured, Vec<Camera>), bodies: &Bodies, stops: usize) -> State {
+    State {
+        robot,
+        mountings: vec![Pose::identity(); pictured.mountings.len()],
+        placements: vec![Pose::identity(); pictured.placements.len()],
+        instruments: vec![Pose::identity(); bodies.instruments.len()],
+        bodies: vec![Pose::identity(); bodies.names.len()],
+        plates: pictured.plates.iter().map(PlateShape::nominal).collect(),
+        joint_errors: vec![Vec::new(); stops],
+        ties: vec![Tie::Free(Pose::identity()); pictured.images.len()],
+        cameras,
+    }
+}
+
+/// First guesses of the variance components, the joint noise of every run by itself; how many sizes displacements have is not yet known.
+fn first_noise(state: &State, layout: &Layout, runs: usize, body_components: usize) -> Noise {
+    let readings = state.robot.chain.readings.len();
+    Noise {
+        pixel_factor: vec![1.0; state.cameras.len()],
+        joint: vec![vec![FIRST_JOINT_NOISE; readings]; runs],
+        local: first_local(state, layout),
+        displacement: Vec::new(),
+        marker: Vec::new(),
+        body: vec![[1.0; 2]; body_components],
+    }
 }
 
 /// The columns of the problem: free are those of which the observations tell something and that nobody holds.

@@ -8,15 +8,15 @@ use crate::assess::Limits;
 use crate::diagnose::{Finding, Mistake, ReadingRatio, RowsOf};
 use crate::error::{Code, Error, Quantity, Result};
 use crate::fit::FreePoses;
-use crate::geom::log_so3;
+use crate::geom::{Pose, log_so3};
 use crate::identify::bodies::rows_of::rows_of_images;
 use crate::identify::mistakes::part_fits::broken;
 use crate::identify::mistakes::suspects::Suspects;
 use crate::identify::start::zeros::place_zeros;
 use crate::identify::start_verdict::{StartReached, StartVerdict};
 use crate::init::{HandEye, HandEyeStart, PosePair, SeenStop, bases, hand_eye_misfit, solve_hand_eye};
-use crate::linalg::median;
 use crate::linalg::symmetric_eigen;
+use crate::linalg::{dense, median};
 use crate::model::one_direction::turns_about_one_direction;
 use crate::model::robot::Robot;
 use crate::problem::{
@@ -27,6 +27,9 @@ use crate::urdf::BASE_FROM_BASE;
 
 /// Closed forms whose pixel cost is compared.
 const COMPARED: usize = 4;
+
+/// Images, each with what it and its readings say.
+type Pairs = Vec<(usize, PosePair)>;
 
 /// What a start is judged by.
 #[derive(Clone, Copy)]
@@ -69,15 +72,7 @@ pub(in crate::identify) fn start_robot(
         place_zeros(adjustment, free, given.limits);
     }
     let mut aside = Vec::new();
-    let robot = &adjustment.state.robot;
-    let pairs = |seen: Vec<(usize, SeenStop)>| seen.into_iter().map(|(i, stop)| (i, stop.pair(robot))).collect();
-    let mut order: Vec<(_, Vec<(usize, PosePair)>)> = free
-        .seen_stops(&adjustment.problem, used(adjustment))
-        .into_iter()
-        .map(|(of, seen)| (of, pairs(seen)))
-        .collect();
-    order.sort_by_key(|((m, p), pairs)| (std::cmp::Reverse(pairs.len()), *m, *p));
-    let (keys, groups): (Vec<_>, Vec<_>) = order.into_iter().unzip();
+    let (keys, groups): (Vec<_>, Vec<_>) = largest_first(adjustment, free).into_iter().unzip();
     let given = StartGiven { groups: &groups, ..given };
     let (mut cameras, mut plates) = (BTreeMap::new(), BTreeMap::new());
     for ((mounting, placement), pairs) in keys.iter().zip(&groups) {
@@ -106,13 +101,26 @@ pub(in crate::identify) fn start_robot(
         plates.insert(*placement, solution.plate);
         aside.extend(set_aside(&mut adjustment.problem, pairs, &solution, given.limits));
     }
-    for (k, pose) in adjustment.state.mountings.iter_mut().enumerate() {
-        *pose = cameras.get(&k).copied().unwrap_or(*pose);
-    }
-    for (k, pose) in adjustment.state.placements.iter_mut().enumerate() {
-        *pose = plates.get(&k).copied().unwrap_or(*pose);
-    }
+    place(&mut adjustment.state.mountings, &cameras);
+    place(&mut adjustment.state.placements, &plates);
     Ok(aside)
+}
+
+/// Images in use by mounting and placement, those with most images first, each image with what it and its readings say.
+fn largest_first(adjustment: &Adjustment, free: &FreePoses) -> Vec<((usize, usize), Pairs)> {
+    let robot = &adjustment.state.robot;
+    let pairs = |seen: Vec<(usize, SeenStop)>| seen.into_iter().map(|(i, stop)| (i, stop.pair(robot))).collect();
+    let seen = free.seen_stops(&adjustment.problem, used(adjustment)).into_iter();
+    let mut order: Vec<(_, Pairs)> = seen.map(|(of, seen)| (of, pairs(seen))).collect();
+    order.sort_by_key(|((m, p), pairs)| (std::cmp::Reverse(pairs.len()), *m, *p));
+    order
+}
+
+/// Poses that were found, by their places; others stay as they are.
+fn place(poses: &mut [Pose], found: &BTreeMap<usize, Pose>) {
+    for (k, pose) in poses.iter_mut().enumerate() {
+        *pose = found.get(&k).copied().unwrap_or(*pose);
+    }
 }
 
 fn used(adjustment: &Adjustment) -> impl Iterator<Item = usize> {
@@ -328,7 +336,7 @@ fn check_rotations(of: &str, poses: &[PosePair], robot: &Robot, limits: &Limits)
         seen = seen.max(log_so3(&turned).norm());
         largest = largest.max(v.norm());
         travel = travel.max((first.chain.translation - p.chain.translation).norm());
-        m += nalgebra::DMatrix::from_column_slice(3, 3, (v * v.transpose()).as_slice()) / poses.len() as f64;
+        m += dense(&(v * v.transpose())) / poses.len() as f64;
     }
     let second = symmetric_eigen(&m).map_or(0.0, |(values, _)| values[1].max(0.0).sqrt());
     if second > limits.hand_eye_rotation_rad {

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use crate::assess::refitted_near;
 use crate::fit::Fit;
 use crate::geom::{Pose, right_jacobian_se3};
-use crate::linalg::{SymmetricFactor, product};
+use crate::linalg::{SymmetricFactor, dense, product};
 use crate::problem::{Adjustment, Chained, Problem, SIZE_OF_DISPLACEMENT, State, Step, TakenFrom, Tie};
 use crate::solve::{
     Acceleration, ComponentOptions, Elimination, JOINT_NOISE_FLOOR, LEAST_FIRST_GUESS, LinearImage,
@@ -197,7 +197,7 @@ impl ErrorModel {
             Estimator::Isotropic => (Matrix6::identity(), vec![0, 0, 0, 1, 1, 1]),
             _ => (self.blocks[first].cholesky()?.l(), vec![0; 6]),
         };
-        let enters_by = DMatrix::from_column_slice(6, 6, enters_by.as_slice());
+        let enters_by = dense(&enters_by);
         Some(Latent { first, enters_by, component, beside: vec![0.0; 6] })
     }
 
@@ -352,8 +352,7 @@ fn predict(Adjustment { problem, state }: &Adjustment, stage: &PoseStage) -> Opt
         let from = TakenFrom { posture: Some(posture), joint_errors: &exact, tie: &upright[i] };
         let Chained { pose, d_theta, d_latent } = state.chained(&problem.layout, image, from)?;
         let x: Vector6<f64> = (stage.references[k].inverse() * pose).log();
-        let chart = right_jacobian_se3(&x).try_inverse()?;
-        let chart = DMatrix::from_column_slice(6, 6, chart.as_slice());
+        let chart = dense(&right_jacobian_se3(&x).try_inverse()?);
         let mut residual = p.residual.fixed_rows_mut::<6>(6 * k);
         residual -= x;
         p.jacobian.rows_mut(6 * k, 6).copy_from(&(&chart * d_theta));

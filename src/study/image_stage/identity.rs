@@ -206,8 +206,9 @@ fn mirrored(picture: &Picture) -> Picture {
 
 /// Compares observations with the truth.
 fn judge(view: &mut IdentityView, truth: &RandomView, plate: &Plate, detection: &Detection) {
-    let place =
-        |index: usize, radius: f64| centroid_uv(&truth.camera, &truth.pose, &plate.markers[index].position_m, radius);
+    let place = |index: usize, radius: f64| {
+        centroid_uv(&truth.camera, &truth.camera_from_plate, &plate.markers[index].position_m, radius)
+    };
     let mut found = vec![false; plate.markers.len()];
     for o in &detection.observations {
         let Some(index) = plate.index_of(o.marker) else {

@@ -32,7 +32,7 @@ const RING_POINTS: usize = 32;
 #[derive(Debug, Clone)]
 pub(super) struct RandomView {
     pub camera: Camera,
-    pub pose: Pose,
+    pub camera_from_plate: Pose,
     pub conditions: ImagingConditions,
     pub tilt_deg: f64,
     /// Indices of the markers that are wholly visible and large enough.
@@ -78,16 +78,16 @@ impl RandomView {
             roll_rad: rng.random_range(0.0..TAU),
             aim_m,
         };
-        let pose = direction.camera_from_plate();
+        let camera_from_plate = direction.camera_from_plate();
         let conditions = conditions(size, direction.distance_m, focal_px, rng);
-        Self { camera, pose, conditions, tilt_deg: cosine.acos().to_degrees(), visible: Vec::new() }
+        Self { camera, camera_from_plate, conditions, tilt_deg: cosine.acos().to_degrees(), visible: Vec::new() }
     }
 
     /// The picture; `seed` is that of its noise.
     pub fn picture(&self, plate: &Plate, seed: u64) -> Picture {
         let mut noise = ChaCha8Rng::seed_from_u64(seed);
         noise.set_stream(1);
-        render(plate, &self.camera, &self.pose, &self.conditions, &mut noise)
+        render(plate, &self.camera, &self.camera_from_plate, &self.conditions, &mut noise)
     }
 
     /// Names of what disturbs the view.
@@ -105,7 +105,8 @@ impl RandomView {
 
     /// The whole outer contour is in the picture, nothing lies before it, it is not saturated, and large enough.
     fn shows(&self, marker: &Marker) -> bool {
-        let outline = |radius: f64| ring(&self.camera, &self.pose, &marker.position_m, radius, RING_POINTS);
+        let outline =
+            |radius: f64| ring(&self.camera, &self.camera_from_plate, &marker.position_m, radius, RING_POINTS);
         let Some(outer) = outline(marker.outer_radius_m) else { return false };
         let half = RING_POINTS / 2;
         let minor = (0..half).map(|k| (outer[k] - outer[k + half]).norm()).fold(f64::MAX, f64::min);
@@ -118,7 +119,8 @@ impl RandomView {
 
     /// Image of one pitch at a marker in the direction in which it is shorter, px.
     pub fn shorter_pitch_px(&self, plate: &Plate, marker: usize) -> f64 {
-        let across = ring(&self.camera, &self.pose, &plate.markers[marker].position_m, plate.pitch_m / 2.0, 16);
+        let across =
+            ring(&self.camera, &self.camera_from_plate, &plate.markers[marker].position_m, plate.pitch_m / 2.0, 16);
         across.map_or(0.0, |r| (0..8).map(|k| (r[k] - r[k + 8]).norm()).fold(f64::MAX, f64::min))
     }
 

@@ -137,7 +137,7 @@ struct Grid<'a> {
 
 /// What the plate says about the sizes of its dots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Told {
+enum StatedSizes {
     /// All radii, of more than one size.
     Radii,
     /// One radius for all dots: the outline alone tells how the plate is turned, however large light makes a dot look.
@@ -163,7 +163,7 @@ impl<'a> Grid<'a> {
         Ok((found, facts))
     }
 
-    fn told(&self) -> Told {
+    fn stated(&self) -> StatedSizes {
         let radius = |m: &Marker| m.outer_radius_m;
         let first = self.plate.markers.first().map_or(0.0, radius);
         if self
@@ -172,13 +172,13 @@ impl<'a> Grid<'a> {
             .iter()
             .any(|m| radius(m) != first || m.inner_radius_m != self.plate.markers[0].inner_radius_m)
         {
-            Told::Radii
+            StatedSizes::Radii
         } else if !self.plate.large.is_empty() {
-            Told::Places
+            StatedSizes::Places
         } else if first > 0.0 {
-            Told::Equal
+            StatedSizes::Equal
         } else {
-            Told::Nothing
+            StatedSizes::Nothing
         }
     }
 
@@ -194,13 +194,13 @@ impl<'a> Grid<'a> {
             let outcome = if candidates.is_empty() { Outcome::NoCandidates } else { Outcome::NoLattice };
             return nothing(outcome, Facts::default());
         };
-        let (told, view) = (self.told(), View { picture, lattice, candidates });
-        let Some(mut dots) = self.dots(told, &view) else { return nothing(Outcome::Ambiguous, Facts::default()) };
-        let plate = self.unturned(told, &dots);
+        let (stated, view) = (self.stated(), View { picture, lattice, candidates });
+        let Some(mut dots) = self.dots(stated, &view) else { return nothing(Outcome::Ambiguous, Facts::default()) };
+        let plate = self.unturned(stated, &dots);
         let code = self.code(&plate)?;
-        let classes = match told {
-            Told::Radii | Told::Places => code.classes_of(lattice, candidates),
-            Told::Equal | Told::Nothing => all_alike(lattice),
+        let classes = match stated {
+            StatedSizes::Radii | StatedSizes::Places => code.classes_of(lattice, candidates),
+            StatedSizes::Equal | StatedSizes::Nothing => all_alike(lattice),
         };
         let (mut laid, outcome) = place(&code, &self.cells, &classes);
         let mut facts = self.outlined(&view, laid.first(), outcome);
@@ -209,13 +209,13 @@ impl<'a> Grid<'a> {
             return nothing(Outcome::Ambiguous, facts);
         }
         let outline_tells = laid.len() == 1;
-        if told == Told::Nothing {
+        if stated == StatedSizes::Nothing {
             self.turn_by_dots(&mut laid, &mut dots, &view);
         }
         let Some(chosen) = laid.iter().min_by(|a, b| a.lean(lattice).total_cmp(&b.lean(lattice))) else {
             return nothing(outcome, facts);
         };
-        let plate = if told == Told::Nothing { self.with_found(&dots, chosen) } else { plate };
+        let plate = if stated == StatedSizes::Nothing { self.with_found(&dots, chosen) } else { plate };
         let elsewhere = others(chosen, &dots);
         if laid.len() > 1 && self.contradicts(&plate, &elsewhere) {
             return Err(dots_elsewhere(&elsewhere));
@@ -224,17 +224,19 @@ impl<'a> Grid<'a> {
         if laid.iter().any(|other| chosen.is_told_from(other, &code, &self.cells)) {
             return nothing(Outcome::Ambiguous, Facts::default());
         }
-        let classes = match told {
-            Told::Equal => all_alike(lattice),
-            Told::Radii | Told::Places | Told::Nothing => self.code(&plate)?.classes_of(lattice, candidates),
+        let classes = match stated {
+            StatedSizes::Equal => all_alike(lattice),
+            StatedSizes::Radii | StatedSizes::Places | StatedSizes::Nothing => {
+                self.code(&plate)?.classes_of(lattice, candidates)
+            }
         };
-        let sizes = match told {
-            Told::Radii | Told::Equal => Sizes::default(),
-            Told::Places | Told::Nothing => self.sizes(&plate, &dots),
+        let sizes = match stated {
+            StatedSizes::Radii | StatedSizes::Equal => Sizes::default(),
+            StatedSizes::Places | StatedSizes::Nothing => self.sizes(&plate, &dots),
         };
         facts.sizes = if outline_tells { Sizes { large: Vec::new(), ..sizes } } else { sizes };
         facts.symmetric = laid.len() > 1;
-        facts.unstated = if told == Told::Equal { larger_dots(&laid, chosen, &view) } else { Vec::new() };
+        facts.unstated = if stated == StatedSizes::Equal { larger_dots(&laid, chosen, &view) } else { Vec::new() };
         facts.outer = self.outer(&view, chosen);
         let size_of = |lattice| View { picture, lattice, candidates }.shape()?.0.columns_and_rows();
         facts.has_twin = lattices.get(1).and_then(size_of).is_some_and(|size| facts.size == Some(size));
@@ -248,22 +250,24 @@ impl<'a> Grid<'a> {
     }
 
     /// The dots of a lattice; `None` where they are not of the sizes that the plate tells.
-    fn dots(&self, told: Told, view: &View) -> Option<Dots> {
-        let of = if told == Told::Equal { Dots::alike } else { Dots::of };
+    fn dots(&self, stated: StatedSizes, view: &View) -> Option<Dots> {
+        let of = if stated == StatedSizes::Equal { Dots::alike } else { Dots::of };
         let mut dots = of(view.lattice, view.candidates)?;
-        if told == Told::Nothing {
+        if stated == StatedSizes::Nothing {
             dots.leave_out_uneven_light(view.lattice, view.candidates);
         }
-        let are_told = told != Told::Places || !dots.other.is_empty();
+        let are_told = stated != StatedSizes::Places || !dots.other.is_empty();
         (are_told && self.agrees(&dots)).then_some(dots)
     }
 
     /// The plate with the radii that are known before it is known how it is turned.
-    fn unturned(&self, told: Told, dots: &Dots) -> Plate {
-        match told {
-            Told::Radii => self.plate.clone(),
-            Told::Places => self.with_large(dots, |marker| self.plate.large.contains(&self.plate.markers[marker].id)),
-            Told::Equal | Told::Nothing => self.with_large(dots, |_| false),
+    fn unturned(&self, stated: StatedSizes, dots: &Dots) -> Plate {
+        match stated {
+            StatedSizes::Radii => self.plate.clone(),
+            StatedSizes::Places => {
+                self.with_large(dots, |marker| self.plate.large.contains(&self.plate.markers[marker].id))
+            }
+            StatedSizes::Equal | StatedSizes::Nothing => self.with_large(dots, |_| false),
         }
     }
 

@@ -18,7 +18,7 @@ use crate::linalg::median;
 
 /// A measured marker: where on the plate (cells), radii in units of the pitch, centroids in the image.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen {
+pub struct MeasuredMarker {
     pub cell: Cell,
     pub outer_radius: f64,
     pub outer: [f64; 2],
@@ -35,7 +35,7 @@ pub struct Inner {
 }
 
 /// Which markers agree (in their order), and the difference that geometry does not explain; `size` is that of the picture.
-pub fn agreement(markers: &[Seen], size: [usize; 2]) -> (Vec<bool>, Option<InnerOuter>) {
+pub fn agreement(markers: &[MeasuredMarker], size: [usize; 2]) -> (Vec<bool>, Option<InnerOuter>) {
     let Some(map) = Map::of(markers) else { return (vec![true; markers.len()], None) };
     let differences: Vec<Option<Difference>> = markers.iter().map(|m| map.difference(m)).collect();
     let mean = |a: usize| median(differences.iter().flatten().map(|d| d.value[a])).unwrap_or(0.0);
@@ -71,15 +71,15 @@ const RING: usize = 32;
 const REACH: i32 = 2;
 
 impl Map {
-    fn of(markers: &[Seen]) -> Option<Self> {
-        let place = |m: &Seen| [f64::from(m.cell.0), f64::from(m.cell.1)];
+    fn of(markers: &[MeasuredMarker]) -> Option<Self> {
+        let place = |m: &MeasuredMarker| [f64::from(m.cell.0), f64::from(m.cell.1)];
         let fit = |shifts: &[[f64; 2]]| {
-            let moved = |(m, s): (&Seen, &[f64; 2])| (place(m), [m.outer[0] - s[0], m.outer[1] - s[1]]);
+            let moved = |(m, s): (&MeasuredMarker, &[f64; 2])| (place(m), [m.outer[0] - s[0], m.outer[1] - s[1]]);
             PlaneMap::fit(&markers.iter().zip(shifts).map(moved).collect::<Vec<_>>())
         };
         let first = fit(&vec![[0.0; 2]; markers.len()])?;
         // centroids are not images of centres: the map through the former tells by how much they differ
-        let shift = |m: &Seen| {
+        let shift = |m: &MeasuredMarker| {
             let at = place(m);
             let to = |d: [f64; 2]| first.apply([at[0] + d[0], at[1] + d[1]]);
             let (centre, centroid) = (to([0.0; 2])?, centroid(&to, m.outer_radius)?);
@@ -87,7 +87,7 @@ impl Map {
         };
         let shifts: Vec<[f64; 2]> = markers.iter().map(|m| shift(m).unwrap_or_default()).collect();
         let projective = fit(&shifts)?;
-        let rest = |m: &Seen, s: &[f64; 2]| {
+        let rest = |m: &MeasuredMarker, s: &[f64; 2]| {
             let image = projective.apply(place(m))?;
             Some((image, [0, 1].map(|a| m.outer[a] - s[a] - image[a])))
         };
@@ -102,7 +102,7 @@ impl Map {
         Some(Self { projective, polynomial, left })
     }
 
-    fn difference(&self, marker: &Seen) -> Option<Difference> {
+    fn difference(&self, marker: &MeasuredMarker) -> Option<Difference> {
         let inner = marker.inner?;
         let (column, row) = marker.cell;
         let mut pairs = Vec::with_capacity(25);
@@ -242,7 +242,7 @@ mod tests {
     const SIZE: [usize; 2] = [1000, 800];
 
     /// Inner centres are off by `shift`, and by `corner` along the radius in the picture's corner.
-    fn seen(shift: [f64; 2], corner: f64) -> Vec<Seen> {
+    fn seen(shift: [f64; 2], corner: f64) -> Vec<MeasuredMarker> {
         let cells = (-7..=7).flat_map(|i| (-5..=5).map(move |j| (i, j)));
         let marker = |cell: Cell| {
             let at = |d: [f64; 2]| Some(image([f64::from(cell.0) + d[0], f64::from(cell.1) + d[1]]));
@@ -254,7 +254,7 @@ mod tests {
             let field = [0, 1].map(|a| (outer[a] - middle[a]) / middle[0].hypot(middle[1]));
             let centre = [0, 1].map(|a| inner[a] + shift[a] + corner * field[a]);
             let inner = Some(Inner { radius: outer_radius / 2.0, centre, sigma: [0.003; 2] });
-            Seen { cell, outer_radius, outer, inner: inner.filter(|_| cell.0 % 2 == 0) }
+            MeasuredMarker { cell, outer_radius, outer, inner: inner.filter(|_| cell.0 % 2 == 0) }
         };
         cells.map(marker).collect()
     }
@@ -282,7 +282,7 @@ mod tests {
     }
 
     /// What a close view over a range of scales of 4 to 1 shows in a picture of 960 x 768; large images of markers are measured better.
-    fn close_view(shift: [f64; 2]) -> Vec<Seen> {
+    fn close_view(shift: [f64; 2]) -> Vec<MeasuredMarker> {
         let marker = |cell: Cell| {
             let at = |d: [f64; 2]| close_image([f64::from(cell.0) + d[0], f64::from(cell.1) + d[1]]);
             let (middle, next) = (at([0.0; 2])?, at([1.0, 0.0])?);
@@ -292,7 +292,7 @@ mod tests {
             let (outer, inner) = (centroid(&at, outer_radius)?, centroid(&at, outer_radius / 2.0)?);
             let centre = [0, 1].map(|a| inner[a] + shift[a]);
             let inner = Inner { radius: outer_radius / 2.0, centre, sigma: [0.3 / step; 2] };
-            let seen = Seen { cell, outer_radius, outer, inner: (cell.0 % 2 == 0).then_some(inner) };
+            let seen = MeasuredMarker { cell, outer_radius, outer, inner: (cell.0 % 2 == 0).then_some(inner) };
             (inside(0, 960.0) && inside(1, 768.0)).then_some(seen)
         };
         (-14..=14).flat_map(|i| (-9..=9).map(move |j| (i, j))).filter_map(marker).collect()

@@ -4,7 +4,7 @@ use crate::detect::Picture;
 use crate::detect::circles::edge::model::Pixels;
 use crate::detect::circles::edge::noise::{OfCentres, left, left_and_followed};
 use crate::detect::circles::edge::refine::Fit;
-use crate::detect::correlated::{Correlation, OddPart, Seen};
+use crate::detect::correlated::{Correlation, LagProducts, OddPart};
 use crate::detect::pictures::few_levels::few_levels;
 use crate::linalg::median;
 
@@ -27,7 +27,7 @@ pub(in crate::detect::circles) struct Bands {
     /// Of every marker, in their order.
     influences: Vec<Option<OfCentres>>,
     /// Of those that are taken: how badly they fit, and what they leave.
-    left: Vec<(f64, Seen)>,
+    left: Vec<(f64, LagProducts)>,
     parts: Vec<(f64, OddPart)>,
 }
 
@@ -53,7 +53,7 @@ impl Bands {
         self.influences.push(solved.map(|solved| OfCentres::of(solved, pixels)));
         let far = |c: f64| (2.0 * c - (2.0 * c).round()).abs() > self.astray;
         let Some(solved) = solved.filter(|_| !fit.measured.outer.ellipse.centre.into_iter().any(far)) else { return };
-        let mut seen = Seen::NOTHING;
+        let mut seen = LagProducts::NOTHING;
         if self.left.len().is_multiple_of(self.stride) {
             let Some(part) = left_and_followed(solved, pixels) else { return };
             part.add_to(&mut seen, 1.0);
@@ -70,7 +70,7 @@ impl Bands {
             return Correlation::WHITE;
         }
         let most = DISTURBED * median(self.left.iter().map(|(misfit, _)| *misfit)).unwrap_or(0.0);
-        let mut sums = Seen::NOTHING;
+        let mut sums = LagProducts::NOTHING;
         self.left.iter().filter(|(misfit, _)| *misfit <= most).for_each(|(_, seen)| sums.add(seen));
         let parts = || self.parts.iter().filter(|(misfit, _)| *misfit <= most).map(|(_, part)| part);
         if sums.pixels() < LEAST_PIXELS || sums.is_white(parts()) {
