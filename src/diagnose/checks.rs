@@ -306,8 +306,66 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::diagnose::LooseMounting;
+    use crate::diagnose::{
+        Carried, ContradictedLengths, Displaced, Displacement, DoubtedSize, InOrder, LooseMounting, PlateSays, ToldBy,
+    };
     use crate::series::CameraMount;
+
+    fn is_explained(finding: &Finding, by: &Finding) -> bool {
+        CHECKS.iter().any(|check| (check.explains)(by, finding))
+    }
+
+    fn fixture_elsewhere(weight: Weight, distance_m: (f64, f64)) -> Finding {
+        Finding::from(Displaced {
+            series: "touches".to_owned(),
+            body: Carried::Places,
+            places: Vec::new(),
+            mounting: "fixture".to_owned(),
+            displacement: Displacement::FromThenOn,
+            images: vec!["t07".to_owned()],
+            distance_m,
+            angle_rad: None,
+            share: 0.8,
+            explains_most: true,
+            weight,
+        })
+    }
+
+    #[test]
+    fn what_moved_may_be_why_a_plate_seems_a_little_off() {
+        let size = |weight: Weight| {
+            Finding::from(DoubtedSize::Contradicted {
+                plate: "plate".to_owned(),
+                measured: false,
+                off: -7e-4,
+                sigma: 2e-4,
+                weight,
+                told_by: ToldBy::Links,
+                in_order: InOrder::default(),
+            })
+        };
+        let moved = |weight: Weight| fixture_elsewhere(weight, (1e-3, 5e-5));
+        assert!(is_explained(&size(Weight::Note), &moved(Weight::Gate)));
+        assert!(!is_explained(&size(Weight::Gate), &moved(Weight::Gate)));
+        assert!(!is_explained(&size(Weight::Note), &moved(Weight::Note)));
+    }
+
+    #[test]
+    fn places_of_another_size_only_seem_to_move() {
+        let lengths = |instrument: &str| {
+            Finding::from(ContradictedLengths {
+                instrument: Some(instrument.to_owned()),
+                off: -0.96,
+                sigma: 0.01,
+                plate: PlateSays::Nothing,
+                on_rail: false,
+            })
+        };
+        let hardly_told = fixture_elsewhere(Weight::Gate, (0.653, 0.423));
+        assert!(is_explained(&hardly_told, &lengths("fixture")));
+        assert!(!is_explained(&hardly_told, &lengths("tracker")));
+        assert!(!is_explained(&fixture_elsewhere(Weight::Gate, (0.653, 0.01)), &lengths("fixture")));
+    }
 
     #[test]
     fn every_check_is_named_after_its_file() {

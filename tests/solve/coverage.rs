@@ -3,6 +3,7 @@
 use crate::robots::kr6;
 use nalgebra::Vector6;
 use robotcal::assess::{MeasuredPoint, View, fit_points, predict_pose};
+use robotcal::diagnose::Finding;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
 use robotcal::model::robot::Robot;
@@ -111,8 +112,14 @@ fn held_out_poses_lie_within_their_stated_sigmas_and_are_ten_times_better_than_n
 const NOISY_RAD: f64 = 0.67e-3;
 const QUIET_RAD: f64 = 0.07e-3;
 
-/// Series of one robot and camera, each with plate and camera mounted anew; the last is noisy. And what they were taken of.
-fn some_series(chain: &Chain, count: usize, stops: usize, seed: u64) -> (Vec<MeasuredSeries>, SimulatedSeries) {
+/// Series of one robot and camera, each with plate and camera mounted anew, with this joint noise and that of the last, rad. And what they were
+/// taken of.
+fn some_series(
+    chain: &Chain,
+    (count, stops): (usize, usize),
+    noise_rad: [f64; 2],
+    seed: u64,
+) -> (Vec<MeasuredSeries>, SimulatedSeries) {
     let mut plate = Plate::lattice(PlateKind::Points, 5, 4, 0.05, 0.03e-3);
     plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
     let world = |joint_noise_rad: f64| {
@@ -126,7 +133,7 @@ fn some_series(chain: &Chain, count: usize, stops: usize, seed: u64) -> (Vec<Mea
         };
         series(&request).unwrap()
     };
-    let (quiet, noisy) = (world(QUIET_RAD), world(NOISY_RAD));
+    let [quiet, noisy] = noise_rad.map(world);
     let of = |k: usize| {
         let mut own = measured(if k + 1 == count { &noisy } else { &quiet }, chain);
         own.stops = own.stops[k * stops..(k + 1) * stops].to_vec();
@@ -136,13 +143,30 @@ fn some_series(chain: &Chain, count: usize, stops: usize, seed: u64) -> (Vec<Mea
     ((0..count).map(of).collect(), quiet)
 }
 
+/// What no robot is suspected of by itself, another series of it tells.
+#[test]
+fn a_series_far_noisier_than_the_others_is_named() {
+    let chain = kr6();
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    for (last_rad, named) in [(0.03e-3, &[][..]), (0.2e-3, &["series 1"])] {
+        let (all, _) = some_series(&chain, (2, 24), [0.03e-3, last_rad], 5);
+        let solution = identify(chain.clone(), &all, &options).unwrap();
+        let noisy = solution.findings.iter().filter_map(|finding| match finding {
+            Finding::JointNoiseLarge(noise) => Some((noise.series.as_str(), noise.quieter.as_ref()?.0.as_str())),
+            _ => None,
+        });
+        let noisy: Vec<_> = noisy.collect();
+        assert_eq!(noisy, named.iter().map(|name| (*name, "series 0")).collect::<Vec<_>>(), "{last_rad}");
+    }
+}
+
 /// Error of the flange, root mean square over the seeds: of the quiet series, and of all.
 fn without_and_with(seeds: std::ops::RangeInclusive<u64>, count: usize, stops: usize) -> [f64; 2] {
     let chain = kr6();
     let options = Options { model: RobotModel::Rigid, ..Options::default() };
     let mut squares = [0.0; 2];
     for seed in seeds {
-        let (all, world) = some_series(&chain, count, stops, seed);
+        let (all, world) = some_series(&chain, (count, stops), [QUIET_RAD, NOISY_RAD], seed);
         let errors = [&all[..count - 1], &all[..]].map(|some| {
             let solution = identify(chain.clone(), some, &options).unwrap();
             let joint = solution.fit.problem.noise.joint.iter();
