@@ -10,6 +10,7 @@ mod controller_poses;
 mod image_file;
 mod image_folder;
 mod inputs;
+mod joint_prefix;
 mod joints;
 mod light;
 mod manifest;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::joint_prefix::remedy_of_prefix;
 use super::joints::Stops;
 use super::manifest::AngleUnit;
 use crate::error::{Code, Error, Notice, Result};
@@ -76,7 +77,8 @@ fn columns_of(file: &Path, stops: &Stops, chain: &Chain) -> Result<Vec<usize>> {
         chain.tip,
         stops.joints.join(", ")
     );
-    let remedy = "name the columns as the joints in the URDF, or choose another base or tip";
+    let remedy = remedy_of_prefix(&missing, &stops.joints)
+        .unwrap_or_else(|| "name the columns as the joints in the URDF, or choose another base or tip".to_owned());
     Err(Error::new(Code::JointMissing, file.display(), what, remedy))
 }
 

@@ -17,6 +17,7 @@ use super::samples::{JointSample, shared};
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::linalg::median_by;
 use crate::series::InputFile;
+use crate::series::joint_prefix::remedy_of_prefix;
 
 /// The joint states of a robot.
 pub(super) struct JointReadings {
@@ -376,12 +377,9 @@ impl Scan {
         }
         if !missing.is_empty() {
             let what = format!("has no positions of {}; its joints are: {}", missing.join(", "), names.join(", "));
-            return Err(Error::new(
-                Code::JointMissing,
-                place,
-                what,
-                "compare with the joint names in the URDF, or choose another tip",
-            ));
+            let remedy = remedy_of_prefix(&missing, &names)
+                .unwrap_or_else(|| "compare with the joint names in the URDF, or choose another tip".to_owned());
+            return Err(Error::new(Code::JointMissing, place, what, remedy));
         }
         let joints = if options.joints.is_empty() { names.clone() } else { options.joints.clone() };
         let extra: Vec<&str> = names.iter().filter(|n| !joints.contains(n)).map(String::as_str).collect();
