@@ -59,10 +59,7 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let mut solution = Solution { evidences, lenses, ..fit.judged(&lensed, options.estimator)? };
     solution.findings.extend(notices.into_iter().map(Into::into));
     solution.findings.extend(of_postures.map(|t| t.finding(series, &told).into()));
-    let tool = of_tool(&rigid, &told, options);
-    // Postures that images told of poses of a tool fit these as those of the flange: as they were before, they may tell the tool.
-    let is_retold = of_postures.is_some_and(|found| found.changed > 0);
-    if let Some(tool) = tool.or_else(|| is_retold.then(|| of_tool(&rigid, series, options)).flatten()) {
+    if let Some(tool) = of_tool(&rigid, &told, options) {
         let of_tool = told.iter().filter(|series| tool.series.contains(&series.name));
         let mountings: Vec<&str> = of_tool.map(|series| series.mounting.as_str()).collect();
         solution.findings.retain(|other| !follows_from_tool(other, &mountings));
