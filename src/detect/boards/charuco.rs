@@ -3,6 +3,9 @@
 //! The `calib-targets` library decodes the markers and so tells which corner is which; the positions are measured as on
 //! a plain chessboard, from the pixels along the edges that the markers leave free.
 
+use std::borrow::Cow;
+use std::cell::LazyCell;
+
 use calib_targets_chessboard::ChessCorner;
 
 use super::charuco_markers::{Marker, Print, decode, prints, rare_prints};
@@ -11,13 +14,14 @@ use super::charuco_placed::placed;
 use super::charuco_seen::{Seen, elsewhere, ids, instead, side_seen};
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
-use super::lattices::Sorted;
-use super::sizes::{best_of_sizes, on_picture, shows_most};
+use super::lattices::{Sorted, on_no_larger};
+use super::sizes::{best_of_sizes, on_picture, scales, shows_most};
 use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 use crate::detect::corners::{Window, measure};
 use crate::detect::pictures::bytes::Bytes;
 use crate::detect::shared::KEEP_OFF_PX;
 use crate::detect::size_seen::twin;
+use crate::detect::tags::scan::all_dictionaries;
 use crate::detect::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::geom::PlaneMap;
@@ -44,13 +48,14 @@ const SURE_BITS: u8 = 1;
 /// An unknown dictionary or one with too few markers; no board in the picture; a mirrored picture; a board of the other layout.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
-    let mut bytes = Bytes::of(picture);
+    let bytes = &Bytes::of(picture);
     let prints = prints(plate)?;
     let least = if plate.aruco.is_some() { 1 } else { LEAST_MARKERS };
     let cells_of = plate.aruco.is_some().then_some(picture);
+    let sizes = scales(bytes).map(|scale| LazyCell::new(move || Scaled::of(bytes, scale)));
     let best = |prints: &[Print]| {
-        let at_scale = |scale: f64| at_scale(&bytes, scale, Sought { prints, board, least, cells_of });
-        best_of_sizes(&bytes, board, |found: &Found| &found.lattice, at_scale)
+        let sought = Sought { prints, board, least, cells_of };
+        best_of_sizes(&sizes, board, |found: &Found| &found.lattice, |scaled| at_scale(scaled, sought))
     };
     let rare = rare_prints(plate);
     let found = match best(&prints)? {
@@ -58,8 +63,9 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
         found => found,
     };
     let Some(found) = found else {
-        bytes.mirror();
-        if at_scale(&bytes, 1.0, Sought { prints: &prints, board, least, cells_of: None })?.is_some() {
+        let mut mirrored = bytes.clone();
+        mirrored.mirror();
+        if at_scale(&Scaled::of(&mirrored, 1.0), Sought { prints: &prints, board, least, cells_of: None })?.is_some() {
             return Err(mirrored_board());
         }
         return Err(elsewhere(picture, plate).map_or_else(|| no_board(plate), |seen| other_board(plate, &seen)));
@@ -172,17 +178,38 @@ struct Sought<'a> {
     cells_of: Option<&'a Picture>,
 }
 
-/// The print that explains most markers in the picture at another size, with what was found.
-fn at_scale(bytes: &Bytes, scale: f64, sought: Sought) -> Result<Option<Found>> {
-    let scaled = bytes.scaled(scale);
-    let mut corners = find_corners(&scaled);
+/// The picture at another size.
+struct Scaled<'a> {
+    scale: f64,
+    bytes: Cow<'a, Bytes>,
+    /// Corners that may be those of a board.
+    corners: Vec<ChessCorner>,
+}
+
+impl<'a> Scaled<'a> {
+    fn of(bytes: &'a Bytes, scale: f64) -> Self {
+        let bytes = bytes.scaled(scale);
+        let corners = on_no_larger(find_corners(&bytes), most_squares());
+        Self { scale, bytes, corners }
+    }
+}
+
+/// Squares of the largest board: no dictionary has markers for more, and what has is a cloth or a floor.
+fn most_squares() -> usize {
+    2 * all_dictionaries().map(|dictionary| dictionary.codes().len()).max().unwrap_or(0)
+}
+
+/// The print that explains most markers in the picture at a size, with what was found.
+fn at_scale(scaled: &Scaled, sought: Sought) -> Result<Option<Found>> {
+    let Scaled { scale, bytes, corners } = scaled;
+    let mut corners = Cow::from(corners);
     loop {
-        let found = among(&corners, (&scaled, scale), sought)?;
+        let found = among(&corners, (bytes, *scale), sought)?;
         let is_most = |found: &Found| found.has_place && shows_most(&found.lattice, sought.board);
         if found.as_ref().is_some_and(|found| sought.cells_of.is_none() || is_most(found)) {
             return Ok(found);
         }
-        let Sorted { lattices, left } = Sorted::of(&corners, scale);
+        let Sorted { lattices, left } = Sorted::of(&corners, *scale);
         let on_lattice = sought.on_lattices(&lattices);
         // Of equals that which the library found.
         if let Some(found) = [on_lattice, found].into_iter().flatten().max_by_key(Found::explains) {
@@ -191,7 +218,7 @@ fn at_scale(bytes: &Bytes, scale: f64, sought: Sought) -> Result<Option<Found>> 
         if lattices.is_empty() {
             return Ok(None);
         }
-        corners = left;
+        corners = Cow::from(left);
     }
 }
 

@@ -4,6 +4,7 @@
 //! turn and every shift is compared with the colours that the squares must have: with row r and column c counted from
 //! the top-left square, a square is dark when r + c is even.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use crate::detect::Picture;
@@ -25,6 +26,10 @@ const NEAR: f64 = 0.25;
 
 /// Corners further from the map of all than this share of a square show that the lens bends the board.
 const BENT: f64 = 0.1;
+/// Cells with all corners found that are compared one by one with any cell; among more of them those up to so many lines away, which have 99 % of
+/// the weight.
+const MOST_COMPARED: usize = 2500;
+const COMPARED_LINES: i32 = 12;
 /// Corners that a map of a neighbourhood needs.
 const LEAST_LOCAL: usize = 6;
 
@@ -193,7 +198,7 @@ pub enum Line {
 pub struct Shader<'a> {
     picture: &'a Picture,
     maps: Maps<'a>,
-    inner: Vec<((i32, i32), f64)>,
+    inner: BTreeMap<(i32, i32), f64>,
 }
 
 impl<'a> Shader<'a> {
@@ -362,7 +367,7 @@ impl<'a> Maps<'a> {
 }
 
 /// Brightness of the cells whose four corners were found.
-fn inner_cells(picture: &Picture, lattice: &Lattice) -> Vec<((i32, i32), f64)> {
+fn inner_cells(picture: &Picture, lattice: &Lattice) -> BTreeMap<(i32, i32), f64> {
     let corner = |u, v| lattice.get(&(u, v));
     lattice
         .keys()
@@ -375,14 +380,21 @@ fn inner_cells(picture: &Picture, lattice: &Lattice) -> Vec<((i32, i32), f64)> {
 }
 
 /// Compares a brightness with the two colours near the cell, so that uneven light does not matter.
-fn relative_shade(value: f64, cell: (i32, i32), inner: &[((i32, i32), f64)]) -> Option<f64> {
+fn relative_shade(value: f64, cell: (i32, i32), inner: &BTreeMap<(i32, i32), f64>) -> Option<f64> {
     let mut sums = [(0.0, 0.0); 2];
-    for &((u, v), brightness) in inner {
+    let add = |(&(u, v), &brightness): (&(i32, i32), &f64)| {
         let distance2 = f64::from((u - cell.0).pow(2) + (v - cell.1).pow(2));
         let weight = (distance2 + 1.0).powi(-2);
         let sum = &mut sums[usize::from((u + v).rem_euclid(2) == 1)];
         sum.0 += weight;
         sum.1 += weight * brightness;
+    };
+    if inner.len() <= MOST_COMPARED {
+        inner.iter().for_each(add);
+    } else {
+        let lines = cell.0 - COMPARED_LINES..=cell.0 + COMPARED_LINES;
+        let near = |u: i32| inner.range((u, cell.1 - COMPARED_LINES)..=(u, cell.1 + COMPARED_LINES));
+        lines.flat_map(near).for_each(add);
     }
     let [even, odd] = sums.map(|(weight, sum)| sum / weight);
     let half_contrast = 0.5 * (even - odd).abs();
@@ -417,5 +429,18 @@ mod tests {
                 assert_eq!(counts.within((u, v), (u + width, v + height)), expected, "{u} {v} {width} {height}");
             }
         }
+    }
+
+    #[test]
+    fn shades_of_a_large_lattice_are_those_of_the_nearer_cells() {
+        let counts = |u: i32, v: i32| 100.0 + 0.3 * f64::from(u) + 40.0 * parity(u, v);
+        let cells = |side: i32| (0..side).flat_map(move |u| (0..side).map(move |v| ((u, v), counts(u, v))));
+        let (small, large): (BTreeMap<_, _>, BTreeMap<_, _>) = (cells(50).collect(), cells(200).collect());
+        assert!(small.len() <= MOST_COMPARED && large.len() > MOST_COMPARED);
+        for (cell, value) in [((25, 25), 110.0), ((20, 31), 90.0), ((25, 24), 140.0), ((3, 28), 70.0)] {
+            let [near, all] = [&large, &small].map(|inner| relative_shade(value, cell, inner).unwrap());
+            assert!((near - all).abs() < 0.02, "{cell:?} {near} {all}");
+        }
+        assert_eq!(relative_shade(100.0, (-40, 25), &large), None);
     }
 }

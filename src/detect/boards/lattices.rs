@@ -93,6 +93,18 @@ fn lattices(corners: &[ChessCorner]) -> Vec<ChessboardDetection> {
         .map_or_else(|_| Vec::new(), |finder| finder.detect_all(corners))
 }
 
+/// The corners that are on no lattice of more than so many.
+pub(super) fn on_no_larger(mut corners: Vec<ChessCorner>, most: usize) -> Vec<ChessCorner> {
+    while corners.len() > most {
+        let larger: Vec<_> = lattices(&corners).into_iter().filter(|found| found.corners.len() > most).collect();
+        if larger.is_empty() {
+            break;
+        }
+        corners = without(&corners, &larger);
+    }
+    corners
+}
+
 fn without(corners: &[ChessCorner], found: &[ChessboardDetection]) -> Vec<ChessCorner> {
     let mut is_left = vec![true; corners.len()];
     for corner in found.iter().flat_map(|lattice| &lattice.corners) {
@@ -104,4 +116,34 @@ fn without(corners: &[ChessCorner], found: &[ChessboardDetection]) -> Vec<ChessC
 /// Sizes of the picture at which lattices are sought, one after the other.
 fn scales(picture: &Picture) -> [f64; 2] {
     if picture.width * picture.height > LARGE_PX { [0.5, 1.0] } else { [1.0, 2.0] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cloth_is_left_out_and_a_board_before_it_stays() {
+        let (width, height) = (480, 400);
+        let square = |u: f64, v: f64, side: f64| {
+            if (u / side).floor() as i32 + (v / side).floor() as i32 & 1 == 0 { 40 } else { 200 }
+        };
+        let value = |k: usize| {
+            let [x, y] = [k % width, k / width].map(|p| p as f64);
+            let [u, v] = [0.94 * (x - 160.0) + 0.34 * (y - 100.0), 0.94 * (y - 100.0) - 0.34 * (x - 160.0)];
+            match (u, v) {
+                (0.0..180.0, 0.0..140.0) => square(u, v, 20.0),
+                (-12.0..192.0, -12.0..152.0) => 200,
+                _ => square(x, y, 12.0),
+            }
+        };
+        let corners = find_corners(&Bytes { width, height, data: (0..width * height).map(value).collect() });
+        let (most, board) = (200, 8 * 6);
+        let largest = |corners: &[ChessCorner]| Sorted::of(corners, 1.0).lattices.first().map_or(0, Lattice::len);
+        assert!(largest(&corners) > most);
+        let left = on_no_larger(corners.clone(), most);
+        assert_eq!(largest(&left), board);
+        assert_eq!(on_no_larger(left.clone(), most), left);
+        assert_eq!(on_no_larger(corners.clone(), corners.len()), corners);
+    }
 }

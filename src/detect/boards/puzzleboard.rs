@@ -12,7 +12,7 @@ use calib_targets_puzzleboard::{
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
 use super::labels::brightness;
-use super::sizes::{best_of_sizes, on_picture};
+use super::sizes::{best_of_sizes, on_picture, scales};
 use crate::detect::circles::{FALSE_ALARMS, binomial_tail};
 use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 use crate::detect::corners::{Window, measure};
@@ -42,7 +42,8 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let puzzle = plate.puzzle.ok_or_else(|| nothing(plate))?;
     let mut bytes = Bytes::of(picture);
     let declared = Reader::declared(board, puzzle).map_err(impossible)?;
-    let look = |bytes: &Bytes| best_of_sizes(bytes, board, |lattice| lattice, |scale| Ok(declared.read(bytes, scale)));
+    let look =
+        |bytes: &Bytes| best_of_sizes(scales(bytes), board, |lattice| lattice, |scale| Ok(declared.read(bytes, scale)));
     let Some(lattice) = look(&bytes)? else {
         if let Some(found) = Reader::anywhere(puzzle).map_err(impossible)?.read(&bytes, 1.0) {
             return Err(elsewhere(&found, [0, 0]));

@@ -12,17 +12,21 @@ const LARGE_PX: usize = 2_000_000;
 /// Share of the board's corners from which no other size is tried.
 const MOST: f64 = 0.75;
 
-/// The find with most corners of the board; `None` where there is no board at any size.
-pub(super) fn best_of_sizes<T>(
-    bytes: &Bytes,
+/// The sizes of a picture, one after the other.
+pub(super) fn scales(bytes: &Bytes) -> [f64; 3] {
+    if bytes.width * bytes.height > LARGE_PX { SCALES_LARGE } else { SCALES }
+}
+
+/// The find with most corners of the board among these sizes; `None` where there is no board at any.
+pub(super) fn best_of_sizes<S, T>(
+    sizes: impl IntoIterator<Item = S>,
     board: BoardSize,
     lattice: impl Fn(&T) -> &Lattice,
-    at_scale: impl Fn(f64) -> Result<Option<T>>,
+    at_size: impl Fn(S) -> Result<Option<T>>,
 ) -> Result<Option<T>> {
-    let large = bytes.width * bytes.height > LARGE_PX;
     let mut best: Option<T> = None;
-    for scale in if large { SCALES_LARGE } else { SCALES } {
-        let Some(found) = at_scale(scale)? else { continue };
+    for size in sizes {
+        let Some(found) = at_size(size)? else { continue };
         if best.as_ref().is_none_or(|other| lattice(&found).len() > lattice(other).len()) {
             best = Some(found);
         }

@@ -35,6 +35,8 @@ pub struct Reader {
     bits: usize,
     border: usize,
     codes: Vec<u64>,
+    /// The least and the greatest number of dark modules of a code.
+    dark: [u32; 2],
 }
 
 impl Reader {
@@ -45,7 +47,10 @@ impl Reader {
             let inner = modules[border..border + bits].iter().flat_map(|line| &line[border..border + bits]);
             inner.enumerate().fold(0u64, |code, (k, dark)| code | u64::from(*dark) << k)
         };
-        Self { bits, border, codes: (0..dictionary.codes().len() as u32).map(code).collect() }
+        let codes: Vec<u64> = (0..dictionary.codes().len() as u32).map(code).collect();
+        let counts = || codes.iter().map(|code| code.count_ones());
+        let dark = [counts().min().unwrap_or(0), counts().max().unwrap_or(0)];
+        Self { bits, border, codes, dark }
     }
 
     /// Modules along a side, with the border.
@@ -87,6 +92,9 @@ impl Reader {
     /// Reads a quadrilateral; `None` where it is no tag of the dictionary. `mirrored` reads it as in a mirror.
     pub fn read(&self, picture: &Picture, quad: &Quad, mirrored: bool) -> Option<Reading> {
         let modules = self.modules(picture, quad)?;
+        if !self.may_be_code(&modules) {
+            return None;
+        }
         let mut best: Option<(u32, u32, usize)> = None;
         let mut second = u32::MAX;
         for turn in 0..4 {
@@ -104,6 +112,13 @@ impl Reader {
         let (wrong, id, turn) = best?;
         let good = wrong <= self.wrong_allowed() && second >= wrong + MARGIN;
         good.then(|| Reading { id, corners: as_printed(quad, turn), wrong })
+    }
+
+    /// Whether a code with so many dark modules is there: a dark square has none.
+    fn may_be_code(&self, modules: &[Vec<bool>]) -> bool {
+        let dark = modules.iter().flatten().filter(|dark| **dark).count() as u32;
+        let ([least, most], wrong) = (self.dark, self.wrong_allowed());
+        dark + wrong >= least && dark <= most + wrong
     }
 
     /// Whether a tag stands where its corners (as printed) are predicted; one module in eight may be wrong.
