@@ -425,3 +425,19 @@ fn a_board_of_another_size_is_named_with_its_image_where_others_are_refused() {
     assert_says(part, Code::PlateContradicted, &["hand.png", "4 x 6"]);
     assert!(hand.what.contains("4 x 6") && !hand.what.contains("hand.png"), "{hand}");
 }
+
+/// The border of the picture cuts off the first row and column of 10 x 7 corners: 9 x 6 are left, of which nobody sees that more follow.
+#[test]
+fn the_lines_that_are_left_of_a_larger_board_do_not_vouch_for_its_size() {
+    let views = [
+        View::new(10, 7, [262.0, 172.0], 60.0, 0.0, [0.0, 0.0]),
+        View::new(10, 7, [321.3, 239.6], 33.0, 0.1, [0.02, -0.015]),
+    ];
+    let pictures = views.map(|view| Scene::new(10, 7, view).render(0));
+    let paths = ["cut.png", "all.png"].map(std::path::PathBuf::from);
+    let picture = |path: &std::path::Path| Ok(pictures[paths.iter().position(|p| p == path).expect("one")].clone());
+    for image in detect_series(&paths, &plate(9, 6), picture, |_| {}) {
+        assert!(image.detection.observations.is_empty());
+        assert_eq!(image.detection.failure.expect("refused").code, Code::PlateContradicted);
+    }
+}

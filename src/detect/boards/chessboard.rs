@@ -59,11 +59,18 @@ fn on_lattice(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Result<
         let why = if by_colours == Labelling::Ambiguous { ambiguous() } else { contradiction(board) };
         return refusal(picture, lattice, board, why);
     };
+    if ends.is_some_and(|ends| ends.exceed(placement)) {
+        return refusal(picture, lattice, board, larger(board));
+    }
     let mut detection = measured(placement);
     // Light that hides a line looks like the end of the board: what is taken for hidden may as well be what is taken for paper.
     if detection.outline == Outline::LineMissing && ends.is_none_or(|ends| !ends.leave_only(board, placement)) {
         let Some((other, placement)) = by_ends() else { return refusal(picture, lattice, board, ambiguous()) };
         (labelling, detection) = (other, measured(placement));
+    }
+    // Lines that are all there may be the first ones of more, where the border of the picture cuts the squares beyond them.
+    if detection.outline == Outline::Whole && BoardSeen::of(picture, lattice).is_none_or(|seen| !seen.is(board)) {
+        detection.outline = Outline::Open;
     }
     let mut notices = Vec::new();
     if matches!(labelling, Labelling::Symmetric(_)) {
@@ -123,6 +130,15 @@ fn contradiction(board: BoardSize) -> Error {
         "image",
         format!("the squares do not have the colours of a board of {} x {} inner corners", board.columns, board.rows),
         "check `columns` and `rows` of the plate file (inner corners) and that the top-left square is dark",
+    )
+}
+
+fn larger(board: BoardSize) -> Error {
+    Error::new(
+        Code::PlateContradicted,
+        "image",
+        format!("squares are seen beyond those of a board of {} x {} inner corners", board.columns, board.rows),
+        "correct `columns` and `rows` of the plate file: they count inner corners, one less than squares",
     )
 }
 

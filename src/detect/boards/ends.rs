@@ -54,6 +54,12 @@ impl Ends {
         one.then_some(if all.len() == 1 { Labelling::Unique(*upright) } else { Labelling::Symmetric(*upright) })
     }
 
+    /// Whether squares are seen beyond the outer ones of a placement: then the board is a larger one.
+    pub fn exceed(&self, placement: Placement) -> bool {
+        let range = placement.range();
+        (0..2).any(|axis| self.range[axis][0] < range[axis][0] || self.range[axis][1] > range[axis][1])
+    }
+
     /// Whether the squares are the only ones of the board that a placement says, whatever hides the others.
     pub fn leave_only(&self, board: BoardSize, placement: Placement) -> bool {
         let mut all = Placement::around(board, self.range).filter(|p| self.allow(*p)).map(Placement::range).peekable();
