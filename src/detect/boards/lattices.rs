@@ -126,7 +126,7 @@ mod tests {
     fn a_cloth_is_left_out_and_a_board_before_it_stays() {
         let (width, height) = (480, 400);
         let square = |u: f64, v: f64, side: f64| {
-            if (u / side).floor() as i32 + (v / side).floor() as i32 & 1 == 0 { 40 } else { 200 }
+            if ((u / side).floor() as i32 + (v / side).floor() as i32).rem_euclid(2) == 0 { 40 } else { 200 }
         };
         let value = |k: usize| {
             let [x, y] = [k % width, k / width].map(|p| p as f64);
