@@ -60,7 +60,7 @@ pub const CHECKS: &[Check] = &[
             (Finding::Displaced(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::Displaced(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             (Finding::Displaced(own), Finding::JointNoiseLarge(noise)) => noise.is_of_what_moved_in(&own.series),
-            (Finding::Displaced(own), Finding::DoubtedSize(size)) => own.explains_size(size),
+            (Finding::Displaced(own), Finding::DoubtedSize(size)) => size.is_explained_by(own.weight),
             (Finding::FocusChange(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::FocusChange(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
             (Finding::ImagesShifted(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
@@ -188,7 +188,9 @@ pub const CHECKS: &[Check] = &[
     Check {
         explains: |own, other| match (own, other) {
             (Finding::ContradictedLengths(own), Finding::DoubtedSize(plate)) => own.explains(plate),
-            (Finding::ContradictedLengths(own), Finding::Displaced(moved)) => own.explains_move(moved),
+            (Finding::ContradictedLengths(own), Finding::Displaced(moved)) => {
+                own.is_of(&moved.mounting) && !moved.is_far()
+            }
             (Finding::ContradictedLengths(own), Finding::ContradictedDistances(other)) => {
                 own.instrument.is_none() && other.weight == Weight::Note
             }

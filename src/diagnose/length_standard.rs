@@ -3,7 +3,6 @@
 use super::kind::{CheckContext, Kind, Quantity, Subject};
 use super::plate_size::{DoubtedSize, with_sizes_released};
 use super::rail::{OR_THE_RAIL, is_on_rail, with_gears_released};
-use super::steps::displaced::Displaced;
 use crate::assess::{Accuracy, Limits};
 use crate::error::Code;
 use crate::fit::Fit;
@@ -51,9 +50,9 @@ impl ContradictedLengths {
         self.plate != PlateSays::Nothing && matches!(other, DoubtedSize::Contradicted { .. })
     }
 
-    /// True where what it measures seems to stand elsewhere, by a distance that is hardly told.
-    pub(super) fn explains_move(&self, moved: &Displaced) -> bool {
-        self.instrument.as_ref() == Some(&moved.mounting) && !moved.is_far()
+    /// True where it is of what this instrument measures.
+    pub(super) fn is_of(&self, instrument: &str) -> bool {
+        self.instrument.as_deref() == Some(instrument)
     }
 }
 

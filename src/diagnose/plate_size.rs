@@ -194,6 +194,11 @@ impl DoubtedSize {
         Some(in_order).filter(|_| self.weight() == Weight::Gate)
     }
 
+    /// True where it is noted only, and something with this weight, which the fit does not hold, may be why the plate seems off.
+    pub(super) fn is_explained_by(&self, weight: Weight) -> bool {
+        weight == Weight::Gate && self.weight() == Weight::Note
+    }
+
     /// True where the joint noise of a series is in order with the size that is told.
     pub(super) fn explains_noise(&self, noise: &JointNoiseLarge) -> bool {
         self.in_order().is_some_and(|in_order| in_order.series.contains(&noise.series))

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::robots::shared;
+use robotcal::Code;
 use robotcal::detect::{Detection, detect_series, load};
 use robotcal::geom::PlaneMap;
 use robotcal::series::{Plate, PlateKind};
@@ -45,7 +46,8 @@ fn all_corners_of_the_real_boards_are_found_with_the_right_ids() {
             assert_eq!(detection.failure, None);
             let count = detection.observations.len();
             assert!(count >= 87, "{}: {count} corners, {:?}", path.display(), detection.dropped);
-            assert!(detection.notices.is_empty(), "{}: {:?}", path.display(), detection.notices);
+            let is_told = detection.notices.iter().all(|notice| notice.code == Code::HotPixels);
+            assert!(is_told, "{}: {:?}", path.display(), detection.notices);
             let misfit = largest_misfit(&detection);
             assert!(misfit < BENT_PX, "{}: {misfit} px", path.display());
         }

@@ -12,7 +12,7 @@ const UNCHANGED: [(&str, &str); 9] = [
     ("cli/images/detect.rs", "has no options"),
     ("cli/series/doctor.rs", "has no options"),
     ("cli/images/poses.rs", "has no options, and writes them into poses.json"),
-    ("cli/corrected_robot/verify_stated.rs", "no solution stands beside the description"),
+    ("cli/corrected_robot/verify_model.rs", "no solution stands beside the description"),
     ("identify/options.rs", "default of the options"),
     ("plan/setting.rs", "a plan leaves nothing out"),
     ("simulate/placement.rs", "simulated, without options"),

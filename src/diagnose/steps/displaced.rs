@@ -1,7 +1,6 @@
 //! The finding that a plate or a camera stands elsewhere in some of the images; [`super::pose_step`] looks for it.
 
 use crate::diagnose::kind::{Kind, Quantity, Subject, Weight, some_of};
-use crate::diagnose::plate_size::DoubtedSize;
 use crate::error::Code;
 
 /// Most images that are named.
@@ -90,11 +89,6 @@ impl Displaced {
     /// True where measurements with this instrument scatter because of it.
     pub(in crate::diagnose) fn explains_scatter_of(&self, instrument: &str) -> bool {
         self.explains_most && self.is_measured() && self.mounting == instrument
-    }
-
-    /// True where a plate seems to be of a size that is noted only, in a series in which what moved fails it.
-    pub(in crate::diagnose) fn explains_size(&self, size: &DoubtedSize) -> bool {
-        self.weight == Weight::Gate && size.weight() == Weight::Note
     }
 
     /// True where it is told that it stands elsewhere, not only that residuals are smaller so.
