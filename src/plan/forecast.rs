@@ -192,6 +192,7 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
     let ranges = ranges(request, plan);
     let mut words = words(&parameters, &ranges, plan, flange, setting.mount);
     words.extend(scale_word(plan, &whole, flange));
+    words.extend(depth_word(request, plan));
     let gains = match &start {
         Some(start) => gains(plan, |leg| Some([start.clone(), exact(&[leg]).ok()?])),
         None => gains(plan, |leg| among_others(plan, leg)),
@@ -283,6 +284,27 @@ fn scale_word(plan: &Plan, covariance: &DMatrix<f64>, flange: f64) -> Option<Str
             covariance[(scale, scale)].sqrt()
         )
     })
+}
+
+/// Says so where an image shows markers more than twice as far away as others, and nothing says where the lens is sharp.
+fn depth_word(request: &PlanRequest, plan: &Plan) -> Option<String> {
+    if request.candidates.sight.focus_m.1.is_finite() {
+        return None;
+    }
+    let depths_m = |leg: usize| {
+        let c = &plan.pool[plan.legs[leg].stop];
+        let depth_m = |&k: &usize| c.camera_from_plate.transform(&request.setting.plate.markers[k].position_m).z;
+        let (near, far) =
+            c.seen.iter().map(depth_m).fold((f64::INFINITY, 0.0_f64), |(near, far), z| (near.min(z), far.max(z)));
+        (leg, near, far)
+    };
+    let ratio = |(_, near, far): &(usize, f64, f64)| far / near;
+    let (leg, near, far) =
+        (0..plan.legs.len()).map(depths_m).max_by(|a, b| ratio(a).total_cmp(&ratio(b))).filter(|d| ratio(d) > 2.0)?;
+    Some(format!(
+        "{} shows markers from {near:.2} to {far:.2} m away, of which few lenses are sharp at both ends: say with --focus-m where yours is",
+        image_name(leg)
+    ))
 }
 
 /// Refuses a plan that cannot do what was asked: named parameters that stay as unknown as before.

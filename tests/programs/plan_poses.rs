@@ -231,6 +231,20 @@ fn every_planned_pose_is_inside_limits_sees_enough_and_touches_nothing() {
     }
 }
 
+/// A plate from 0.15 m to far behind its middle: no lens is sharp there, unless it is said to be.
+#[test]
+fn views_that_no_lens_holds_sharp_are_named_where_nothing_is_said_of_it() {
+    let mut request = PlanRequest { rounds: 0, ..request("kuka_kr6_r900", 8) };
+    let [unsaid, said] = [f64::INFINITY, 9.0].map(|far_m| {
+        request.candidates.sight.focus_m = (0.0, far_m);
+        let plan = plan(&request).unwrap();
+        (plan.chosen.clone(), forecast(&request, &plan).unwrap().words)
+    });
+    assert_eq!(unsaid.0, said.0);
+    assert_eq!(unsaid.1.len(), said.1.len() + 1, "{:?} {:?}", unsaid.1, said.1);
+    assert!(unsaid.1.starts_with(&said.1));
+}
+
 #[test]
 fn rounds_of_search_only_improve_and_are_the_same_with_any_number_of_threads() {
     let mut request = request("ur10e", 12);

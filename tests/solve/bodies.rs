@@ -223,6 +223,22 @@ fn a_ball_that_sat_in_another_socket_is_left_out_by_name() {
     assert_eq!(found.subjects(), [Subject::Stop("005".into())]);
 }
 
+/// Touches that are said to be of one socket: it may have moved.
+#[test]
+fn the_socket_that_all_left_out_touches_are_of_is_named() {
+    for (wrong, named) in [(&[2, 30, 45][..], Some("socket 1")), (&[2], None)] {
+        let mut world = World::sockets(7, 4, 14, 5e-5, 2e-5);
+        wrong.iter().for_each(|k: &usize| world.series.bodies[*k].instrument = "socket 1".into());
+        let solution = world.solve(RobotModel::Rigid);
+        let found = solution.findings.iter().find_map(|finding| match finding {
+            Finding::MeasurementsLeftOut(found) => Some(found),
+            _ => None,
+        });
+        let found = found.unwrap();
+        assert_eq!((found.named.len(), found.all_of.as_deref()), (wrong.len(), named));
+    }
+}
+
 #[test]
 fn a_left_out_measurement_is_named_by_its_own_series_behind_several_cameras() {
     let mut world = World::sockets(7, 3, 14, 5e-5, 2e-5);

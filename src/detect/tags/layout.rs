@@ -93,10 +93,10 @@ impl Layout {
         said.into_iter().filter(|(_, _, what)| Some(*what) == most).map(|(id, steps, _)| (id, steps)).collect()
     }
 
-    /// Length of so many steps, in sides of a tag: the median over pairs of tags.
+    /// Length of so many steps, in sides of a tag: the median over pairs of tags whose numbers change as those of most.
     pub fn length(&self, steps: i64) -> Option<f64> {
         let along = |steps: Steps, lines: [[usize; 2]; 2]| {
-            self.pairs(steps).flat_map(move |(a, b)| lines.map(|line| self.apart(a, b, line)))
+            self.as_numbered(steps).flat_map(move |(a, b)| lines.map(|line| self.apart(a, b, line)))
         };
         let rows = along((steps, 0), [[0, 1], [3, 2]]);
         let lengths: Vec<f64> = rows.chain(along((0, steps), [[0, 3], [1, 2]])).filter(|p| p.is_finite()).collect();
@@ -114,6 +114,12 @@ impl Layout {
         let [a, b, c, d] = [one[from], one[to], other[from], other[to]].map(Vector2::from);
         let ratio = (c - a).norm() * (d - b).norm() / ((c - b).norm() * (d - a).norm());
         (ratio / (ratio - 1.0)).sqrt()
+    }
+
+    /// The pairs whose numbers say that they are so many steps apart; all of them where too few agree.
+    fn as_numbered(&self, steps: Steps) -> impl Iterator<Item = (u32, u32)> {
+        let change = self.change(steps);
+        self.pairs(steps).filter(move |(from, to)| change.is_none_or(|by| i64::from(*to) - i64::from(*from) == by))
     }
 
     fn pairs(&self, (i, j): Steps) -> impl Iterator<Item = (u32, u32)> {
@@ -185,4 +191,27 @@ fn most_frequent<T: Ord + Copy>(all: impl Iterator<Item = T>) -> Option<(T, usiz
     let mut counts: BTreeMap<T, usize> = BTreeMap::new();
     all.for_each(|one| *counts.entry(one).or_default() += 1);
     counts.into_iter().rev().max_by_key(|(_, count)| *count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::PlaneMap;
+
+    /// Seen so slantwise that tags of other rows are nearest.
+    #[test]
+    fn tags_that_stand_as_numbered_tell_how_far_they_are_apart() {
+        let (columns, rows, pitch) = (6, 4, 1.25);
+        let [right, below] = [columns, rows].map(|n| f64::from(n) * pitch + 0.25);
+        let paper = [[-0.5, -0.5], [right, -0.5], [right, below], [-0.5, below]];
+        let seen = [[543.0, 473.0], [1014.0, 185.0], [783.0, 573.0], [330.0, 1000.0]];
+        let map = PlaneMap::fit(&paper.into_iter().zip(seen).collect::<Vec<_>>()).unwrap();
+        let tag = |id: u32| {
+            let [x, y] = [id % columns, id / columns].map(|n| f64::from(n) * pitch);
+            let corners = [[x, y + 1.0], [x + 1.0, y + 1.0], [x + 1.0, y], [x, y]];
+            (id, corners.map(|corner| map.apply(corner).unwrap()))
+        };
+        let layout = Layout::of(&(0..columns * rows).map(tag).collect());
+        assert!((layout.length(1).unwrap() - pitch).abs() < 1e-6, "{:?}", layout.length(1));
+    }
 }

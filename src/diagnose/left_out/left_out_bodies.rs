@@ -1,5 +1,7 @@
 //! Do measurements of trackers and contacts belong to their stops?
 
+use std::collections::BTreeSet;
+
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::problem::{Adjustment, BodyRejection, stop_name};
@@ -14,18 +16,22 @@ pub struct MeasurementsLeftOut {
     pub named: Vec<[String; 3]>,
     /// How many there were.
     pub all: usize,
+    /// Of several trackers and places the one that all are of, where they are not few.
+    pub all_of: Option<String>,
     /// Note, gate, or refusal where most are left out.
     pub weight: Weight,
 }
 
 pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<MeasurementsLeftOut> {
     let problem = &adjustment.problem;
-    let mut named = Vec::new();
+    let (mut named, mut instruments) = (Vec::new(), BTreeSet::new());
+    // What was written again and again has a finding of its own.
     for measured in &problem.body_measurements {
-        // What was written again and again has a finding of its own.
         let Some(why) = measured.rejected.filter(|why| *why != BodyRejection::Repeated) else { continue };
         let name = stop_name(setting.series, measured.read);
-        named.push([name, problem.instruments[measured.instrument].name.clone(), why.to_string()]);
+        let instrument = &problem.instruments[measured.instrument].name;
+        instruments.insert(instrument);
+        named.push([name, instrument.clone(), why.to_string()]);
     }
     let (out, all) = (named.len(), problem.body_measurements.len());
     let share = |limit: f64| out as f64 > limit * all as f64;
@@ -35,7 +41,9 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<Measurem
         () if share(setting.limits.share_of_images_left_out) => Weight::Gate,
         () => Weight::Note,
     };
-    Some(MeasurementsLeftOut { named, all, weight })
+    let is_one = instruments.len() == 1 && problem.instruments.len() > 1 && out >= setting.limits.moved_images;
+    let all_of = instruments.first().filter(|_| is_one).map(|name| (*name).clone());
+    Some(MeasurementsLeftOut { named, all, all_of, weight })
 }
 
 impl Kind for MeasurementsLeftOut {
@@ -70,6 +78,12 @@ impl Kind for MeasurementsLeftOut {
     }
 
     fn remedy(&self) -> String {
-        "check joint_unit, the order and signs of the joints, that every row names its own stop, and that instrument and targets did not move".into()
+        let usual = "check joint_unit, the order and signs of the joints, that every row names its own stop, and that instrument and targets did not move";
+        match &self.all_of {
+            Some(name) => format!(
+                "all are of {name}: did it move? Then give the rows before and after another name each; else {usual}"
+            ),
+            None => usual.to_owned(),
+        }
     }
 }
