@@ -90,8 +90,10 @@ pub enum Outline {
     /// Some outer line of corners or tags is out of view, or the plate has none.
     #[default]
     Open,
-    /// All four outer lines of corners were found, or a tag in each.
+    /// All four outer lines of corners were found, and where it ends; or a tag in each outer line.
     Whole,
+    /// The lines alone: where the border of the picture cuts what is beyond them, more of the board may follow.
+    Lines,
     /// The same beside a larger board, of which another image may show a part alone.
     Beside,
     /// An outer line of corners is not where it should be in view: it is covered, or the board is smaller than the plate says.

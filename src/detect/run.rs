@@ -226,6 +226,10 @@ fn refuse_unproven_boards(images: &[PathBuf], plate: &Plate, found: &mut [Series
     let other = other.and_then(|i| i.detection.failure.as_ref()).map(named);
     let missing = || found.iter().filter(|i| i.detection.outline == Outline::LineMissing);
     let line = || {
+        // No line is missing of a board of which another image shows them all.
+        if of(Outline::Lines).is_some() {
+            return None;
+        }
         let told = missing().find(|i| i.detection.size_seen.is_some()).or_else(|| missing().next())?;
         Some(line_missing(plate, &told.detection))
     };
@@ -246,7 +250,8 @@ fn named(failure: &Error) -> Error {
 /// other board has.
 fn refuse_parts_of_another(images: &[PathBuf], plate: &Plate, found: &mut [SeriesImage]) {
     let shows_another = |i: &SeriesImage| [Outline::Beside, Outline::OtherSize].contains(&i.detection.outline);
-    let is_part = |i: &SeriesImage| [Outline::Open, Outline::LineMissing].contains(&i.detection.outline);
+    let is_part =
+        |i: &SeriesImage| [Outline::Open, Outline::Lines, Outline::LineMissing].contains(&i.detection.outline);
     let remedy = "take the other board out of view, or take the image so that all of the stated one is in view";
     let refused = |path: &PathBuf, image: &SeriesImage| {
         let span = Some(image).filter(|i| is_part(i) && i.detection.failure.is_none())?.detection.span(plate);

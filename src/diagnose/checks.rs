@@ -59,7 +59,9 @@ pub const CHECKS: &[Check] = &[
         explains: |own, other| match (own, other) {
             (Finding::Displaced(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::Displaced(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
-            (Finding::Displaced(own), Finding::JointNoiseLarge(noise)) => noise.is_of_what_moved_in(&own.series),
+            (Finding::Displaced(own), Finding::JointNoiseLarge(noise)) => {
+                noise.is_of_what_moved_in(&own.series, own.weight)
+            }
             (Finding::Displaced(own), Finding::DoubtedSize(size)) => size.is_explained_by(own.weight),
             (Finding::FocusChange(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::FocusChange(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
@@ -72,7 +74,9 @@ pub const CHECKS: &[Check] = &[
                 other.is_by_turns() && own.explains_two_places() && own.series == other.series
             }
             (Finding::ZeroMoved(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
-            (Finding::ZeroMoved(own), Finding::JointNoiseLarge(noise)) => noise.is_of_what_moved_in(&own.series),
+            (Finding::ZeroMoved(own), Finding::JointNoiseLarge(noise)) => {
+                noise.is_of_what_moved_in(&own.series, own.weight)
+            }
             (Finding::Displaced(own), Finding::MeasurementsScatter(other)) => {
                 own.explains_scatter_of(&other.instrument)
             }
@@ -309,9 +313,11 @@ mod tests {
 
     use super::*;
     use crate::diagnose::{
-        Carried, ContradictedLengths, Displaced, Displacement, DoubtedSize, InOrder, LooseMounting, PlateSays, ToldBy,
+        Carried, ContradictedLengths, Displaced, Displacement, DoubtedSize, InOrder, JointNoiseLarge, LooseMounting,
+        PlateSays, ToldBy,
     };
     use crate::series::CameraMount;
+    use crate::urdf::JointKind;
 
     fn is_explained(finding: &Finding, by: &Finding) -> bool {
         CHECKS.iter().any(|check| (check.explains)(by, finding))
@@ -350,6 +356,32 @@ mod tests {
         assert!(is_explained(&size(Weight::Note), &moved(Weight::Gate)));
         assert!(!is_explained(&size(Weight::Gate), &moved(Weight::Gate)));
         assert!(!is_explained(&size(Weight::Note), &moved(Weight::Note)));
+    }
+
+    #[test]
+    fn what_moved_explains_the_noise_of_its_own_stops_and_no_gate_by_a_note() {
+        let noise = |weight: Weight, series: &str| {
+            Finding::from(JointNoiseLarge {
+                series: series.to_owned(),
+                joint: "a2".to_owned(),
+                kind: JointKind::Revolute,
+                sigma: 3e-3,
+                worst_predicted: Vec::new(),
+                badly_seen: Vec::new(),
+                stands_still: None,
+                quieter: Some(("quiet".to_owned(), 5e-5)),
+                of_same_stops: vec![series.to_owned()],
+                by_images: true,
+                readings_are_computed: false,
+                readings_are_poses: false,
+                weight,
+            })
+        };
+        let moved = |weight: Weight| fixture_elsewhere(weight, (1e-3, 5e-5));
+        assert!(is_explained(&noise(Weight::Note, "touches"), &moved(Weight::Note)));
+        assert!(is_explained(&noise(Weight::Gate, "touches"), &moved(Weight::Gate)));
+        assert!(!is_explained(&noise(Weight::Gate, "touches"), &moved(Weight::Note)));
+        assert!(!is_explained(&noise(Weight::Note, "other"), &moved(Weight::Gate)));
     }
 
     #[test]

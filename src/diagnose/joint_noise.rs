@@ -7,7 +7,7 @@ use crate::error::Code;
 use crate::fit::Fit;
 use crate::linalg::median;
 use crate::model::robot::Posture;
-use crate::problem::{Adjustment, Problem};
+use crate::problem::{Adjustment, MeasuredSeries, Problem};
 use crate::solve::noise_information;
 use crate::urdf::JointKind;
 
@@ -23,7 +23,7 @@ pub struct ImageValue {
     pub value: f64,
 }
 
-/// The joint noise of a series is larger than robots in order have.
+/// The joint noise of a series is larger than robots in order have, or far larger than that of another series of the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointNoiseLarge {
     /// Series.
@@ -40,8 +40,10 @@ pub struct JointNoiseLarge {
     pub badly_seen: Vec<ImageValue>,
     /// Stops at which that joint reads the same.
     pub stands_still: Option<StandsStill>,
-    /// The quietest of the other series of the robot and its noise, rad or m, where this one is far noisier.
+    /// The quietest of the other series of the robot and its noise of that joint, rad or m, where this one is far noisier.
     pub quieter: Option<(String, f64)>,
+    /// All series with this noise: cameras at the same stops have one.
+    pub of_same_stops: Vec<String>,
     /// Whether images tell of it; else trackers and contacts do.
     pub by_images: bool,
     /// Whether the readings were computed from poses of a controller.
@@ -55,9 +57,10 @@ pub struct JointNoiseLarge {
 pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> Vec<JointNoiseLarge> {
     let limits = setting.limits;
     let noise_found = setting.with_noise_found(fit);
-    let of_series = |(k, of): (usize, &crate::problem::MeasuredSeries)| {
+    let of_series = |(k, of): (usize, &MeasuredSeries)| {
         let (reading, joint, sigma) = noisiest_joint(noise_found, k)?;
-        let quieter = quieter_series(noise_found, setting, (k, sigma));
+        let readings_are_poses = fit.state.robot.chain.pose_coordinates().is_some();
+        let quieter = quieter_series(noise_found, setting, (k, reading)).filter(|_| !readings_are_poses);
         let kind = fit.state.robot.chain.reading_kinds[reading];
         let readings_are_computed = of.readings_are_computed();
         let weight = match sigma {
@@ -86,22 +89,30 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
             badly_seen: standing_out(problem, k, sigma_px, limits.times_usual_blur),
             stands_still: stands_still(of, reading, limits.moved_images),
             quieter,
+            of_same_stops: of_same_noise(noise_found, setting, k),
             by_images: problem.used_on_robot().any(|i| problem.images[i].series == k),
             readings_are_computed,
-            readings_are_poses: fit.state.robot.chain.pose_coordinates().is_some(),
+            readings_are_poses,
             weight,
         })
     };
     setting.series.iter().enumerate().filter(|(k, _)| says_noise_first(fit, *k)).filter_map(of_series).collect()
 }
 
-/// The quietest other series of the robot, where one with this noise is far noisier.
-fn quieter_series(fit: &Fit, setting: &CheckContext, (series, sigma): (usize, f64)) -> Option<(String, f64)> {
+/// The other series of the robot with the least noise of a reading, where this one is far noisier.
+fn quieter_series(fit: &Fit, setting: &CheckContext, (series, reading): (usize, usize)) -> Option<(String, f64)> {
     let limits = setting.limits;
+    let sigma = |series: usize| fit.problem.joint_sigma(fit.problem.noise_of(series))[reading];
     let is_other = |other: &usize| fit.problem.noise_of(*other) != fit.problem.noise_of(series);
-    let of = |other: usize| Some((setting.series[other].name.clone(), noisiest_joint(fit, other)?.2));
-    let quietest = (0..setting.series.len()).filter(is_other).filter_map(of).min_by(|a, b| a.1.total_cmp(&b.1));
-    quietest.filter(|(_, quiet)| sigma >= limits.noisier_from && sigma > limits.times_quieter_noise * quiet)
+    let quietest = (0..setting.series.len()).filter(is_other).min_by(|a, b| sigma(*a).total_cmp(&sigma(*b)))?;
+    let (own, quiet) = (sigma(series), sigma(quietest));
+    let is_noisier = own >= limits.noisier_from && own > limits.times_quieter_noise * quiet;
+    is_noisier.then(|| (setting.series[quietest].name.clone(), quiet))
+}
+
+fn of_same_noise(fit: &Fit, setting: &CheckContext, series: usize) -> Vec<String> {
+    let is_same = |(k, _): &(usize, &MeasuredSeries)| fit.problem.noise_of(*k) == fit.problem.noise_of(series);
+    setting.series.iter().enumerate().filter(is_same).map(|(_, of)| of.name.clone()).collect()
 }
 
 /// False where bodies alone tell of the noise and leave open whether there is any of this joint, as where several joints explain the same errors, or where
@@ -150,16 +161,17 @@ fn in_words(what: &str, images: &[ImageValue], shown: impl Fn(f64) -> String) ->
 }
 
 impl JointNoiseLarge {
-    /// True where what moved in this series is why it is noisier than others of the robot.
-    pub(super) fn is_of_what_moved_in(&self, series: &str) -> bool {
-        self.quieter.is_some() && self.series == series
+    /// True where what moved in a series, with this weight, is why it is noisier than others of the robot.
+    pub(super) fn is_of_what_moved_in(&self, series: &str, weight: Weight) -> bool {
+        let weighs_no_more = self.weight == Weight::Note || weight == Weight::Gate;
+        self.quieter.is_some() && weighs_no_more && self.of_same_stops.iter().any(|own| own == series)
     }
 
     /// What robots repeat to, or the other series of this one.
     fn usual(&self) -> String {
         let unit = self.kind.units()[1];
         match &self.quieter {
-            Some((name, sigma)) => format!("in series {name} this robot repeats to {:.2} {unit}", 1e3 * sigma),
+            Some((name, sigma)) => format!("in series {name} it repeats to {:.3} {unit}", 1e3 * sigma),
             None => format!(
                 "{} repeat to some 0.1 {unit}",
                 if self.kind == JointKind::Prismatic { "rails" } else { "robots" }

@@ -341,7 +341,7 @@ codes! {
         FewImages "few_images" "few images: the nominal model decides much of the result",
         FocusChanged "focus_changed" "focus or zoom changed during the series",
         ReadingsRounded "readings_rounded" "joint readings were rounded to a step that is as large as the joint noise",
-        JointNoiseLarge "joint_noise_large" "the joint noise is larger than robots have",
+        JointNoiseLarge "joint_noise_large" "the joint noise is larger than robots have, or far larger than in another series of the robot",
         JointNoiseContradicted "joint_noise_contradicted" "the data show another joint noise than the stated one",
         PlateMoved "plate_moved" "the plate was moved: images were left out",
         CameraMoved "camera_moved" "the camera was moved on its mount: images were left out",

@@ -441,3 +441,23 @@ fn the_lines_that_are_left_of_a_larger_board_do_not_vouch_for_its_size() {
         assert_eq!(image.detection.failure.expect("refused").code, Code::PlateContradicted);
     }
 }
+
+/// All lines of corners are seen where the border of the picture cuts the outer squares: a line that a sheet covers elsewhere is not missing.
+#[test]
+fn boards_whose_outer_squares_are_cut_vouch_for_a_covered_line() {
+    let scene = |square: f64, angle: f64| Scene::new(9, 6, View::new(9, 6, [320.0, 240.0], square, angle, [0.0; 2]));
+    let covered = scene(40.0, 0.02);
+    let mut with_sheet = covered.render(0);
+    let sheet_from = covered.corner(8)[0] - 20.0;
+    for (k, pixel) in with_sheet.pixels.iter_mut().enumerate() {
+        if (k % with_sheet.width) as f64 > sheet_from {
+            *pixel = 120.0;
+        }
+    }
+    let pictures = [scene(68.0, 0.0).render(0), scene(67.0, 0.01).render(1), with_sheet];
+    let paths = ["one.png", "two.png", "covered.png"].map(std::path::PathBuf::from);
+    let picture = |path: &std::path::Path| Ok(pictures[paths.iter().position(|p| p == path).expect("one")].clone());
+    let found = detect_series(&paths, &plate(9, 6), picture, |_| {});
+    let counts: Vec<usize> = found.iter().map(|image| image.detection.observations.len()).collect();
+    assert!(counts[..2] == [54, 54] && (40..=48).contains(&counts[2]), "{counts:?} {:?}", found[2].detection.failure);
+}

@@ -27,8 +27,8 @@ pub(super) const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0, arm: 1.0
 /// at the centre of the top-left pixel.
 ///
 /// # Errors
-/// No board in the picture; colours that contradict the plate; so little of the outline that the part seen could lie in several
-/// places. A board of another size is a failure of the detection.
+/// No board in the picture; colours that contradict the plate; squares beyond those of the plate; so little of the outline that the part seen could
+/// lie in several places. A board of another size is a failure of the detection.
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
     let seen = Lattices::of(picture);
@@ -55,13 +55,16 @@ fn on_lattice(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Result<
     let by_ends = || placed(ends.as_ref()?.place(board)?);
     let measured = |placement: Placement| measure(picture, lattice, placement, WINDOW);
     let by_colours = label(picture, lattice, board);
-    let Some((mut labelling, placement)) = placed(by_colours).or_else(by_ends) else {
-        let why = if by_colours == Labelling::Ambiguous { ambiguous() } else { contradiction(board) };
+    let exceeded = |placement: Placement| ends.is_some_and(|ends| ends.exceed(placement));
+    let of_colours = placed(by_colours);
+    let Some((mut labelling, placement)) = of_colours.filter(|(_, p)| !exceeded(*p)).or_else(by_ends) else {
+        let why = match by_colours {
+            _ if of_colours.is_some() => larger(board),
+            Labelling::Ambiguous => ambiguous(),
+            _ => contradiction(board),
+        };
         return refusal(picture, lattice, board, why);
     };
-    if ends.is_some_and(|ends| ends.exceed(placement)) {
-        return refusal(picture, lattice, board, larger(board));
-    }
     let mut detection = measured(placement);
     // Light that hides a line looks like the end of the board: what is taken for hidden may as well be what is taken for paper.
     if detection.outline == Outline::LineMissing && ends.is_none_or(|ends| !ends.leave_only(board, placement)) {
@@ -70,7 +73,7 @@ fn on_lattice(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Result<
     }
     // Lines that are all there may be the first ones of more, where the border of the picture cuts the squares beyond them.
     if detection.outline == Outline::Whole && BoardSeen::of(picture, lattice).is_none_or(|seen| !seen.is(board)) {
-        detection.outline = Outline::Open;
+        detection.outline = Outline::Lines;
     }
     let mut notices = Vec::new();
     if matches!(labelling, Labelling::Symmetric(_)) {

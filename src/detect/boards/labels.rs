@@ -27,7 +27,7 @@ const NEAR: f64 = 0.25;
 /// Corners further from the map of all than this share of a square show that the lens bends the board.
 const BENT: f64 = 0.1;
 /// Cells with all corners found that are compared one by one with any cell; among more of them those up to so many lines away, which have 99 % of
-/// the weight.
+/// the weight inside; cells further beyond them have no shade.
 const MOST_COMPARED: usize = 2500;
 const COMPARED_LINES: i32 = 12;
 /// Corners that a map of a neighbourhood needs.

@@ -93,8 +93,8 @@ impl Displaced {
 
     /// True where it is told that it stands elsewhere, not only that residuals are smaller so.
     pub(in crate::diagnose) fn is_far(&self) -> bool {
-        let (distance_m, sigma_m) = self.distance_m;
-        distance_m > 2.0 * sigma_m
+        let is_told = |(by, sigma): (f64, f64)| by > 2.0 * sigma;
+        is_told(self.distance_m) || self.angle_rad.is_some_and(is_told)
     }
 
     /// True where a tracker or contacts show it, not images.

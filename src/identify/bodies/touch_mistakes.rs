@@ -2,7 +2,7 @@
 //! best), named where one of them explains it.
 //!
 //! Readings may be in another order, of another sign or of other rows; the places may be mirrored, or one of them wrong; the tool that was given
-//! may be another; the tool may have been bent, or the work object moved, between two touches. A place that may be wrong counts as unknown. The work object after some touch is
+//! may be another; the tool may have been bent, or the work object moved, between two touches; all places may be further apart than is said. A place that may be wrong counts as unknown. The work object after some touch is
 //! `D` away from where it was: `D` brings its places, as given, to where they are found while they count as unknown.
 
 use std::cmp::Ordering;
@@ -531,7 +531,7 @@ fn other_size(TouchSize { off, sigma }: TouchSize) -> Words {
         100.0 * sigma,
         if off > 0.0 { "further apart" } else { "closer together" }
     );
-    let remedy = "check the places, and the size of the plate with which the robot was identified: measure two far markers, give [scale] and run `identify` again";
+    let remedy = "check the places, and the size of the plate, or of what else the robot was identified with: measure two far markers, give [scale] and run `identify` again";
     (Code::LengthsContradicted, what, remedy.to_owned())
 }
 

@@ -3,8 +3,10 @@
 use crate::assess::Limits;
 use crate::frames::{Given, KnownRobot, TouchPlace, Touches, fit};
 
-/// Changes of the size between which a parabola is laid, one after the other.
-const STEPS: [f64; 3] = [3e-3, 3e-4, 3e-4];
+/// Change of the size by which the first parabola is laid, and parabolas; the others are as wide as the size is uncertain, so that the same touches
+/// are left out along them.
+const FIRST_STEP: f64 = 3e-3;
+const ROUNDS: usize = 3;
 
 /// The ratio, less one, by which touched places lie further apart than the robot has them, with its sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +28,8 @@ pub fn size_of_places(robot: &KnownRobot, touches: &Touches, given: &Given, limi
         Some(found.size.powi(2) * found.freedom as f64)
     };
     let mut found = TouchSize { off: 0.0, sigma: f64::INFINITY };
-    for step in STEPS {
+    for _ in 0..ROUNDS {
+        let step = found.sigma.min(FIRST_STEP);
         let [below, here, above] = [-step, 0.0, step].map(|change| squares(found.off + change));
         let (below, here, above) = (below?, here?, above?);
         let curvature = (above - 2.0 * here + below) / step.powi(2);
