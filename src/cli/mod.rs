@@ -18,11 +18,12 @@ mod verdict;
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 
+use clap::error::{ContextKind, ContextValue};
 use clap::{Parser, Subcommand};
 use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::prelude::*;
 
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, closest_name};
 use corrected_robot::{compensate, frames, verify, verify_args};
 use flags::arguments::command_text;
 use images::{detect, plate, poses};
@@ -126,7 +127,7 @@ pub fn summary_of(record: &crate::output::solution_json::SolutionRecord) -> Stri
 
 /// Runs the program with the arguments of the process.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = Cli::try_parse().unwrap_or_else(|error| without_other_unit(error).exit());
     if let Some(code) = memory::in_a_child() {
         return code;
     }
@@ -164,6 +165,20 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Without the tip that a unit may be meant by another one, which is spelt alike.
+fn without_other_unit(mut error: clap::Error) -> clap::Error {
+    let word = |kind| match error.get(kind) {
+        Some(ContextValue::String(word)) => Some(word.as_str()),
+        _ => None,
+    };
+    if let (Some(given), Some(tip)) = (word(ContextKind::InvalidValue), word(ContextKind::SuggestedValue))
+        && closest_name(given, [tip]).is_none()
+    {
+        error.remove(ContextKind::SuggestedValue);
+    }
+    error
+}
+
 fn start_log(verbose: u8) {
     let level = match verbose {
         0 => tracing::Level::WARN,
@@ -187,9 +202,10 @@ mod tests {
     use std::collections::BTreeSet;
     use std::path::Path;
 
+    use clap::error::{ContextKind, ContextValue};
     use clap::{CommandFactory, Parser};
 
-    use super::{Cli, examples};
+    use super::{Cli, examples, without_other_unit};
 
     #[test]
     fn every_example_is_understood_and_every_command_has_some() {
@@ -206,6 +222,17 @@ mod tests {
         let commands: Vec<_> = command.get_subcommands().filter(|c| c.get_name() != "help").collect();
         assert_eq!(commands.len(), examples::ALL.len());
         assert!(commands.iter().all(|c| c.get_after_help().is_some()));
+    }
+
+    #[test]
+    fn no_unit_is_proposed_for_another() {
+        let tip = |unit: &str| {
+            let words = ["robotcal", "compensate", "p.csv", "--joint-unit", unit];
+            let error = without_other_unit(Cli::try_parse_from(words).err().unwrap());
+            assert_eq!(error.get(ContextKind::InvalidValue), Some(&ContextValue::String(unit.to_owned())));
+            error.get(ContextKind::SuggestedValue).is_some()
+        };
+        assert_eq!(["mrad", "mdeg", "gon", "radd"].map(tip), [false, false, false, true]);
     }
 
     /// Flags of programs of ROS that texts name, and a colour of the style sheet.

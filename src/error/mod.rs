@@ -194,7 +194,7 @@ fn shown(text: &str) -> String {
 /// The known name that was probably meant by `given`: at most two letters (a third of a short word) away, else `None`.
 ///
 /// Case and the choice between `-`, `_` and blank do not count. Numbers do: `stop 7` was not meant by `stop 8`. So do axes: `x_m` was not meant by
-/// `z_m`. Of equally near names the first one wins.
+/// `z_m`. And so do units that stand alone: `rad` was not meant by `mrad`. Of equally near names the first one wins.
 pub fn closest_name<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let given = plain(given);
     let numbers_of_given = numbers(&given);
@@ -203,25 +203,29 @@ pub fn closest_name<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -
         .into_iter()
         .map(|name| (plain(name), name))
         .filter(|(name, _)| name.len().abs_diff(given.len()) <= reach && numbers(name) == numbers_of_given)
-        .filter(|(name, _)| !is_of_another_axis(&given, name))
+        .filter(|(name, _)| !is_of_another_axis(&given, name) && !is_another_unit(&given, name))
         .map(|(plain, name)| (edit_distance(&given, &plain), name))
         .filter(|(distance, _)| *distance <= reach)
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, name)| name)
 }
 
-/// Units at the ends of names.
-const UNITS: [&str; 10] = ["m", "mm", "cm", "um", "rad", "mrad", "deg", "s", "ms", "ns"];
+/// Units of lengths, angles and times, alone or at the ends of names.
+const UNITS: [&str; 21] = [
+    "m", "mm", "cm", "um", "in", "inch", "ft", "rad", "mrad", "urad", "deg", "mdeg", "grad", "gon", "arcmin", "arcsec",
+    "rev", "s", "ms", "us", "ns",
+];
 
 /// What to do with a name that is there instead of the wanted one: one of another unit is not renamed alone.
 pub fn renaming(there: &str, wanted: &str) -> String {
+    conversion(there, wanted).unwrap_or_else(|| format!("rename \"{there}\" to \"{wanted}\""))
+}
+
+/// What to do where the name that is there ends in another unit than the wanted one.
+pub fn conversion(there: &str, wanted: &str) -> Option<String> {
     let unit = |name: &str| name.rsplit_once('_').and_then(|(_, end)| UNITS.into_iter().find(|u| *u == end));
-    match (unit(there), unit(wanted)) {
-        (Some(from), Some(to)) if from != to => {
-            format!("convert \"{there}\" from {from} to {to}, and name it \"{wanted}\"")
-        }
-        _ => format!("rename \"{there}\" to \"{wanted}\""),
-    }
+    let (from, to) = (unit(there)?, unit(wanted)?);
+    (from != to).then(|| format!("convert \"{there}\" from {from} to {to}, and name it \"{wanted}\""))
 }
 
 /// Letters without case, one separator, and digits for the letters that look like them behind a digit.
@@ -257,6 +261,12 @@ fn is_of_another_axis(a: &[char], b: &[char]) -> bool {
         }
         _ => false,
     }
+}
+
+/// Whether both are units, and not the same one.
+fn is_another_unit(a: &[char], b: &[char]) -> bool {
+    let is_unit = |name: &[char]| UNITS.iter().any(|unit| unit.chars().eq(name.iter().copied()));
+    a != b && is_unit(a) && is_unit(b)
 }
 
 /// Levenshtein distance.
@@ -336,5 +346,16 @@ mod tests {
             assert_eq!(closest_name(missing, axes), None, "{missing}");
         }
         assert_eq!(closest_name("X m", axes), Some("x_m"));
+    }
+
+    #[test]
+    fn a_unit_is_not_taken_for_another() {
+        for unit in ["mrad", "urad", "mdeg", "grad", "gon"] {
+            assert_eq!(closest_name(unit, ["deg", "rad"]), None, "{unit}");
+        }
+        for unit in ["mm", "um", "in"] {
+            assert_eq!(closest_name(unit, ["m"]), None, "{unit}");
+        }
+        assert_eq!(closest_name("Rad", ["deg", "rad"]), Some("rad"));
     }
 }

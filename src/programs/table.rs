@@ -18,7 +18,7 @@ use super::reason::Why;
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Notice, Result, closest_name, renaming};
 use crate::geom::Pose;
-use crate::series::{AngleUnit, check_unit};
+use crate::series::{AngleUnit, check_unit, remedy_of_prefix};
 use crate::urdf::JointKind;
 
 const POSE_COLUMNS: [&str; 7] = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"];
@@ -135,7 +135,8 @@ fn columns(file: &TextFile, header: &Row, setting: &ProgramSetting<'_>) -> Resul
     let joints = all(&readings)?;
     if pose.is_none() && joints.is_empty() {
         let what = format!("has neither joint columns nor pose columns (its columns are {})", names.join(", "));
-        let remedy = format!("name them {}, or {}", readings.join(", "), POSE_COLUMNS.join(", "));
+        let remedy = remedy_of_prefix(&readings, &names)
+            .unwrap_or_else(|| format!("name them {}, or {}", readings.join(", "), POSE_COLUMNS.join(", ")));
         return Err(Error::new(Code::CsvColumnMissing, place(), what, remedy));
     }
     let is_extra = |i: &usize| pose.is_some() && !joints.contains(i) && is_external(&names[*i]);

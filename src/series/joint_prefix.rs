@@ -1,7 +1,7 @@
 //! Joints of a description and of a file whose names differ by a prefix alone.
 
 /// What is to be done where all joints that are missing are there with a prefix, or without theirs.
-pub(super) fn remedy_of_prefix(missing: &[&str], there: &[String]) -> Option<String> {
+pub fn remedy_of_prefix(missing: &[&str], there: &[String]) -> Option<String> {
     let first = missing.first()?;
     let are_there = |renamed: &dyn Fn(&str) -> Option<String>| {
         missing.iter().all(|name| renamed(name).is_some_and(|name| there.contains(&name)))

@@ -49,6 +49,7 @@ pub use controller_file::parse_controller;
 pub use controller_poses::{ControllerPoses, ReadOtherwise};
 pub use image_folder::is_image;
 pub use inputs::{InputFile, sha256};
+pub(crate) use joint_prefix::remedy_of_prefix;
 pub use joints::{Covariates, DEFAULT_PLACEMENT, SeriesStop, StopKey, Stops};
 pub use manifest::{AngleUnit, CirclePoint, Manifest, ObservationsSection, RobotSection, StopOrder};
 pub use measurement_series::{Series, Source};

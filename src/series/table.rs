@@ -7,6 +7,7 @@ use std::path::Path;
 use unicode_normalization::UnicodeNormalization;
 
 use super::inputs::{InputFile, read_text};
+use super::joint_prefix::remedy_of_prefix;
 use crate::error::{Code, Error, Result, closest_name, plain_name, renaming};
 use crate::files::FileKind;
 
@@ -219,6 +220,16 @@ impl Table {
         })
     }
 
+    /// The columns of joints, in their order.
+    pub fn require_joints(&self, joints: &[String]) -> Result<Vec<usize>> {
+        let missing: Vec<&str> = joints.iter().map(String::as_str).filter(|name| self.column(name).is_none()).collect();
+        let columns = joints.iter().map(|name| self.require(name)).collect::<Result<_>>();
+        columns.map_err(|error| match remedy_of_prefix(&missing, &self.headers) {
+            Some(remedy) => Error { remedy, ..error },
+            None => error,
+        })
+    }
+
     /// Refuses columns that no reader asks for: a misspelt optional column would be ignored in silence.
     pub fn refuse_unknown(&self, known: &[&str]) -> Result<()> {
         match self.headers.iter().find(|h| !known.contains(&h.as_str())) {
@@ -349,4 +360,22 @@ pub fn csv_line(row: &[String]) -> String {
         false => cell.clone(),
     };
     row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joints_that_stand_with_a_prefix_are_told_so_and_others_renamed() {
+        let remedy = |header: &str| {
+            let table = Table::parse(Path::new("points.csv"), &format!("x_m,{header}\n0,1,2\n")).unwrap();
+            table.require_joints(&["joint_1".to_owned(), "joint_2".to_owned()]).unwrap_err().remedy
+        };
+        let names = |all: [&str; 2]| all.map(str::to_owned);
+        let missing = ["joint_1", "joint_2"];
+        let of_prefix = remedy_of_prefix(&missing, &names(["left_joint_1", "left_joint_2"]));
+        assert_eq!(Some(remedy("left_joint_1,left_joint_2")), of_prefix);
+        assert_eq!(remedy("jont_1,joint_2"), renaming("jont_1", "joint_1"));
+    }
 }

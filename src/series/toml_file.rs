@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::inputs::{InputFile, read_text};
-use crate::error::{Code, Error, Result, closest_name, plain_name};
+use crate::error::{Code, Error, Result, closest_name, conversion, plain_name};
 use crate::files::FileKind;
 
 /// A value that must be positive and finite where it is given.
@@ -107,7 +107,7 @@ fn toml_remedy(message: &str) -> String {
     if message.starts_with("unknown") {
         let known: Vec<&str> = quoted.collect();
         return match closest_name(first, known.iter().copied()) {
-            Some(meant) => format!("is \"{meant}\" meant?"),
+            Some(meant) => conversion(first, meant).unwrap_or_else(|| format!("is \"{meant}\" meant?")),
             None if message.starts_with("unknown variant") => format!("write \"{}\"", known.join("\" or \"")),
             None => "remove it or correct its name".into(),
         };
@@ -121,12 +121,21 @@ fn toml_remedy(message: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::renaming;
 
     #[test]
     fn a_value_that_is_none_of_those_known_is_told_which_there_are() {
-        for (unit, meant) in [("degree", &["deg", "rad"][..]), ("degr", &["deg"])] {
+        let both = &["deg", "rad"][..];
+        for (unit, meant) in [("degree", both), ("degr", &["deg"]), ("mrad", both), ("mdeg", both), ("grad", both)] {
             let remedy = toml_remedy(&format!("unknown variant `{unit}`, expected `deg` or `rad`"));
             assert!(meant.iter().all(|unit| remedy.contains(&format!("\"{unit}\""))), "{remedy}");
         }
+    }
+
+    #[test]
+    fn a_key_of_another_unit_is_converted_not_renamed() {
+        let remedy = toml_remedy("unknown field `pitch_mm`, expected one of `rows`, `pitch_m`");
+        assert_eq!(remedy, renaming("pitch_mm", "pitch_m"));
+        assert!(remedy.contains("from mm to m"), "{remedy}");
     }
 }

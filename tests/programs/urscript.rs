@@ -264,6 +264,12 @@ fn bad_input_is_refused_with_its_line() {
         ("b.csv", format!("{joints}\n0,0,0,0,0\n"), Code::CsvCellCount, ["b.csv:2", "5 "]),
         ("c.csv", "a,b\n1,2\n".to_owned(), Code::CsvColumnMissing, ["c.csv:1", "a, b"]),
         (
+            "l.csv",
+            format!("left_{}\n1,2,3,4,5,6\n", joints.replace(',', ",left_")),
+            Code::CsvColumnMissing,
+            ["l.csv:1", "'left_'"],
+        ),
+        (
             "d.csv",
             joints.replace("wrist_3_joint", "wrist_joint_3") + "\n",
             Code::CsvColumnMissing,

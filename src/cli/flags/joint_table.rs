@@ -51,8 +51,7 @@ fn read_rows(
 ) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
     let table = Table::read(path, &mut Vec::new())?;
     let columns = |names: &[&str]| names.iter().map(|name| table.require(name)).collect::<Result<Vec<usize>>>();
-    let joints: Vec<&str> = chain.readings.iter().map(String::as_str).collect();
-    let (plain, joints) = (columns(first)?, columns(&joints)?);
+    let (plain, joints) = (columns(first)?, table.require_joints(&chain.readings)?);
     let numbers = |row, columns: &[usize]| columns.iter().map(|c| table.number(row, *c)).collect::<Result<Vec<f64>>>();
     let read = |row| -> Result<(Vec<f64>, Vec<f64>)> { Ok((numbers(row, &plain)?, numbers(row, &joints)?)) };
     let mut rows: Vec<(Vec<f64>, Vec<f64>)> =

@@ -45,17 +45,18 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedRe
     found
 }
 
-/// Wrongly paired images that fit the readings of each other in circles.
+/// Wrongly paired images that fit the readings of others, and the circles of those that fit each other's.
 pub(super) struct ReadingCircles {
-    /// For every image of a circle the one whose readings it fits, with how well; none for others.
-    next: Vec<Option<(usize, f64)>>,
+    /// For every image the one whose readings it fits, and how well; none for others.
+    fits: Vec<Option<(usize, f64)>>,
+    is_in_circle: Vec<bool>,
 }
 
 impl ReadingCircles {
     pub fn of(problem: &Problem) -> Self {
         let fits: Vec<Option<(usize, f64)>> =
             (0..problem.images.len()).map(|image| whose_readings_fit(problem, image)).collect();
-        let mut next = vec![None; fits.len()];
+        let mut is_in_circle = vec![false; fits.len()];
         let mut is_met = vec![false; fits.len()];
         for first in 0..fits.len() {
             let (mut way, mut at) = (Vec::new(), first);
@@ -68,20 +69,25 @@ impl ReadingCircles {
             }
             // A way that comes back to one of its own images ends in a circle.
             let back_at = way.iter().position(|image| *image == at);
-            way.iter().skip(back_at.unwrap_or(way.len())).for_each(|image| next[*image] = fits[*image]);
+            way.iter().skip(back_at.unwrap_or(way.len())).for_each(|image| is_in_circle[*image] = true);
         }
-        Self { next }
+        Self { fits, is_in_circle }
     }
 
     pub fn contain(&self, image: usize) -> bool {
-        self.next[image].is_some()
+        self.is_in_circle[image]
+    }
+
+    /// Of an image outside the circles the one whose readings it fits, and how well.
+    pub fn fit_outside(&self, image: usize) -> Option<(usize, f64)> {
+        self.fits[image].filter(|_| !self.contain(image))
     }
 
     /// The images of a circle from one of them on, each with how well it fits the readings of the next, the last those of the first.
     fn beginning_with(&self, first: usize) -> Vec<(usize, f64)> {
         let mut circle = Vec::new();
         let mut at = first;
-        while let Some((next, misfit)) = self.next[at] {
+        while let Some((next, misfit)) = self.fits[at] {
             circle.push((at, misfit));
             at = next;
             if at == first {
@@ -93,7 +99,7 @@ impl ReadingCircles {
 }
 
 /// The image of whose readings a wrongly paired one is, and how well it fits them.
-pub(super) fn whose_readings_fit(problem: &Problem, image: usize) -> Option<(usize, f64)> {
+fn whose_readings_fit(problem: &Problem, image: usize) -> Option<(usize, f64)> {
     let image = &problem.images[image];
     let Some(ImageRejection::WronglyPaired(Mismatch::Fit { fits: Some(fits), .. })) = &image.rejected else {
         return None;

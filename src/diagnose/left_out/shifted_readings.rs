@@ -1,9 +1,9 @@
 //! Do images that were left out one after the other fit the readings of their neighbours?
 
-use super::exchanged_readings::{ReadingCircles, whose_readings_fit};
+use super::exchanged_readings::ReadingCircles;
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::error::Code;
-use crate::problem::{Adjustment, Problem};
+use crate::problem::Adjustment;
 
 /// Images beside readings that were shifted by a row, and left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +29,7 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ShiftedRead
         let of_camera: Vec<usize> = (0..problem.images.len()).filter(|&i| problem.images[i].camera == camera).collect();
         for below in [true, false] {
             let all: Vec<Option<f64>> =
-                (0..of_camera.len()).map(|k| fits_neighbour((problem, &circles), &of_camera, k, below)).collect();
+                (0..of_camera.len()).map(|k| fits_neighbour(&circles, &of_camera, k, below)).collect();
             let places: Vec<usize> = (0..all.len()).collect();
             let runs = places.chunk_by(|a, b| all[*a].is_some() && all[*b].is_some());
             for run in runs.filter(|run| run.len() >= setting.limits.moved_images) {
@@ -55,16 +55,10 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ShiftedRead
 
 /// How well an image that was left out fits the readings of its neighbour among those of its camera; `None` where it does not, or where readings were
 /// exchanged in a circle.
-fn fits_neighbour(
-    (problem, circles): (&Problem, &ReadingCircles),
-    of_camera: &[usize],
-    place: usize,
-    below: bool,
-) -> Option<f64> {
-    let image = of_camera[place];
-    let (other, misfit) = whose_readings_fit(problem, image)?;
+fn fits_neighbour(circles: &ReadingCircles, of_camera: &[usize], place: usize, below: bool) -> Option<f64> {
+    let (other, misfit) = circles.fit_outside(of_camera[place])?;
     let neighbour = if below { of_camera.get(place + 1) } else { of_camera.get(place.checked_sub(1)?) };
-    (neighbour == Some(&other) && !circles.contain(image)).then_some(misfit)
+    (neighbour == Some(&other)).then_some(misfit)
 }
 
 impl ShiftedReadings {
