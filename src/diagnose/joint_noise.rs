@@ -161,10 +161,9 @@ fn in_words(what: &str, images: &[ImageValue], shown: impl Fn(f64) -> String) ->
 }
 
 impl JointNoiseLarge {
-    /// True where what moved in a series, with this weight, is why it is noisier than others of the robot.
+    /// True where what moved in a series, and weighs no less, is why it is noisier than others of the robot.
     pub(super) fn is_of_what_moved_in(&self, series: &str, weight: Weight) -> bool {
-        let weighs_no_more = self.weight == Weight::Note || weight == Weight::Gate;
-        self.quieter.is_some() && weighs_no_more && self.of_same_stops.iter().any(|own| own == series)
+        self.quieter.is_some() && self.weight <= weight && self.of_same_stops.iter().any(|own| own == series)
     }
 
     /// What robots repeat to, or the other series of this one.

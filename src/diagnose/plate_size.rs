@@ -1,6 +1,8 @@
 //! Whether a plate has the size that its file states. The lengths of the robot's links are the only others there are; of poses without a robot, the
 //! positions of the controller.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DVector, Vector3};
 
 use super::joint_noise::{JointNoiseLarge, noisiest_joint};
@@ -68,6 +70,8 @@ pub enum DoubtedSize {
         weight: Weight,
         /// What says so.
         told_by: ToldBy,
+        /// Series that show the plate.
+        shown_in: Vec<String>,
         /// What is in order of the robot with the size that it says.
         in_order: InOrder,
     },
@@ -138,8 +142,8 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
             }
         {
             let (off, sigma, in_order) = (told.off, told.sigma, in_order());
-            let plate = plate.clone();
-            doubts.push(DoubtedSize::Contradicted { plate, measured, off, sigma, weight, told_by, in_order });
+            let (plate, shown_in) = (plate.clone(), shown_in(problem, k, setting));
+            doubts.push(DoubtedSize::Contradicted { plate, measured, off, sigma, weight, told_by, shown_in, in_order });
         }
         if let Some((off, tolerance)) = uneven {
             let along = fitted.as_ref().and_then(|Fitted { told, along, .. }| {
@@ -150,6 +154,12 @@ pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Doub
         }
     }
     doubts
+}
+
+/// Names of the series whose images in use show a plate.
+fn shown_in(problem: &Problem, plate: usize, setting: &CheckContext) -> Vec<String> {
+    let showing = problem.used().filter(|(_, image)| image.plate == plate).map(|(_, image)| image.series);
+    showing.collect::<BTreeSet<usize>>().into_iter().map(|series| setting.series[series].name.clone()).collect()
 }
 
 /// By how much plates, by their names, are larger than stated for a robot that is held, which counts as exact: where `fitted` has camera and plates
@@ -194,9 +204,10 @@ impl DoubtedSize {
         Some(in_order).filter(|_| self.weight() == Weight::Gate)
     }
 
-    /// True where it is noted only, and something with this weight, which the fit does not hold, may be why the plate seems off.
-    pub(super) fn is_explained_by(&self, weight: Weight) -> bool {
-        weight == Weight::Gate && self.weight() == Weight::Note
+    /// True where it is noted only, and what moved in a series that shows the plate weighs more and may be why it seems off.
+    pub(super) fn is_of_what_moved_in(&self, series: &str, weight: Weight) -> bool {
+        let Self::Contradicted { shown_in, .. } = self else { return false };
+        self.weight() < weight && shown_in.iter().any(|own| own == series)
     }
 
     /// True where the joint noise of a series is in order with the size that is told.

@@ -177,6 +177,7 @@ fn what_was_seen_and_what_to_do_stay_apart() {
         sigma: 0.001,
         weight: Weight::Gate,
         told_by: ToldBy::Links,
+        shown_in: Vec::new(),
         in_order: InOrder::default(),
     });
     assert!(found.fails() && found.remedy().contains("; "), "a remedy of two parts: {found}");
@@ -271,6 +272,7 @@ fn rows_that_were_exchanged_are_put_right_before_a_failed_result_is_tried_again(
         sigma: 0.001,
         weight: Weight::Gate,
         told_by: ToldBy::Links,
+        shown_in: Vec::new(),
         in_order: InOrder::default(),
     };
     let pair = vec!["img_003.png".to_owned(), "img_008.png".to_owned()];
