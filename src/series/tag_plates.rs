@@ -175,16 +175,7 @@ pub(super) fn dictionary_of(family: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn kalibr() -> Tags {
-        Tags {
-            dictionary: "DICT_APRILTAG_36h11".to_owned(),
-            print: TagPrint::Kalibr,
-            side_m: 0.05,
-            gap_m: 0.015,
-            first_id: 0,
-        }
-    }
+    use crate::series::tags::kalibr;
 
     #[test]
     fn corners_count_from_the_bottom_left() {

@@ -159,19 +159,21 @@ pub(super) fn square([x, y]: [f64; 2], half: f64) -> Vec<[f64; 2]> {
     vec![[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]]
 }
 
+/// Tags as Kalibr prints them.
+#[cfg(test)]
+pub(super) fn kalibr() -> Tags {
+    Tags {
+        dictionary: "DICT_APRILTAG_36h11".to_owned(),
+        print: TagPrint::Kalibr,
+        side_m: 0.05,
+        gap_m: 0.015,
+        first_id: 0,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn kalibr() -> Tags {
-        Tags {
-            dictionary: "DICT_APRILTAG_36h11".to_owned(),
-            print: TagPrint::Kalibr,
-            side_m: 0.05,
-            gap_m: 0.015,
-            first_id: 0,
-        }
-    }
 
     /// The first code of the family as its makers state it: 0xd5d628584, light bits set, the highest bit at the top-left.
     #[test]

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::whole::Origin;
 use crate::outputs_support::{context, robot, series, series_in_postures, solved};
 use nalgebra::{Matrix4, Vector3, Vector6};
 use robotcal::Code;
@@ -367,23 +368,9 @@ fn exported(robot: &Robot, description: &RobotDescription, q: &[f64]) -> Pose {
     Robot::nominal(chain.chain(Some(&robot.chain.base), None).unwrap()).base_from_tip(q)
 }
 
-#[derive(Debug, Deserialize, Clone, Copy)]
-#[serde(deny_unknown_fields)]
-struct Origin {
-    x: f64,
-    y: f64,
-    z: f64,
-    roll: f64,
-    pitch: f64,
-    yaw: f64,
-}
-
-impl Origin {
-    /// The origin, then a turn about z.
-    fn turned(&self, q: f64) -> Pose {
-        let turn = Pose::new(exp_so3(&(Vector3::z() * q)), Vector3::zeros());
-        Pose::from_xyz_rpy([self.x, self.y, self.z], [self.roll, self.pitch, self.yaw]) * turn
-    }
+/// The origin, then a turn about z.
+fn turned(origin: &Origin, q: f64) -> Pose {
+    origin.pose() * Pose::new(exp_so3(&(Vector3::z() * q)), Vector3::zeros())
 }
 
 fn assert_same(what: &str, one: Pose, other: Pose) {
@@ -411,7 +398,7 @@ struct Links {
 fn read_by_ur_description(file: &File, before: Pose, q: &[f64]) -> Pose {
     let k = &file.kinematics;
     let links = [k.shoulder, k.upper_arm, k.forearm, k.wrist_1, k.wrist_2, k.wrist_3];
-    links.iter().zip(q).fold(before, |pose, (link, q)| pose * link.turned(*q))
+    links.iter().zip(q).fold(before, |pose, (link, q)| pose * turned(link, *q))
 }
 
 #[test]
@@ -497,7 +484,8 @@ fn kinematics_yaml_of_a_franka_and_of_an_xarm_is_what_their_descriptions_read() 
     let file: BTreeMap<String, Joint> = serde_saphyr::from_str(&kinematics_yaml(&robot, &description, "")).unwrap();
     assert_eq!(file.len(), 8);
     let turns = q.iter().copied().chain([0.0]).enumerate();
-    let read = turns.fold(Pose::identity(), |pose, (k, q)| pose * file[&format!("joint{}", k + 1)].kinematic.turned(q));
+    let read =
+        turns.fold(Pose::identity(), |pose, (k, q)| pose * turned(&file[&format!("joint{}", k + 1)].kinematic, q));
     assert_same("franka", read, exported(&robot, &description, &q));
     for count in [5, 6, 7] {
         let description = built(&rows(&arm("", "link_base", count)), 0);
@@ -508,7 +496,7 @@ fn kinematics_yaml_of_a_franka_and_of_an_xarm_is_what_their_descriptions_read() 
         let joints = &file["kinematics"];
         assert_eq!(joints.len(), count);
         let turns = q[..count].iter().enumerate();
-        let read = turns.fold(Pose::identity(), |pose, (k, q)| pose * joints[&format!("joint{}", k + 1)].turned(*q));
+        let read = turns.fold(Pose::identity(), |pose, (k, q)| pose * turned(&joints[&format!("joint{}", k + 1)], *q));
         assert_same("xarm", read, exported(&robot, &description, &q[..count]));
     }
 }

@@ -168,9 +168,9 @@ fn of_several_plates_that_of_a_marker_is_named() {
     assert_eq!([place(None), place(Some("plate 2".into()))], ["marker 3", "marker 3 of plate 2"]);
 }
 
-#[test]
-fn what_was_seen_and_what_to_do_stay_apart() {
-    let found = Finding::from(DoubtedSize::Contradicted {
+/// A plate of another size than its file says, which fails the result.
+fn contradicted_size() -> DoubtedSize {
+    DoubtedSize::Contradicted {
         plate: "plate".into(),
         measured: false,
         off: 0.02,
@@ -179,7 +179,12 @@ fn what_was_seen_and_what_to_do_stay_apart() {
         told_by: ToldBy::Links,
         shown_in: Vec::new(),
         in_order: InOrder::default(),
-    });
+    }
+}
+
+#[test]
+fn what_was_seen_and_what_to_do_stay_apart() {
+    let found = Finding::from(contradicted_size());
     assert!(found.fails() && found.remedy().contains("; "), "a remedy of two parts: {found}");
     let mut record = record();
     record.failed_gates = vec![found.to_string()];
@@ -265,16 +270,6 @@ fn a_pattern_that_was_found_is_said_beside_how_often_larger_ones_are() {
 
 #[test]
 fn rows_that_were_exchanged_are_put_right_before_a_failed_result_is_tried_again() {
-    let doubted = DoubtedSize::Contradicted {
-        plate: "plate".into(),
-        measured: false,
-        off: 0.02,
-        sigma: 0.001,
-        weight: Weight::Gate,
-        told_by: ToldBy::Links,
-        shown_in: Vec::new(),
-        in_order: InOrder::default(),
-    };
     let pair = vec!["img_003.png".to_owned(), "img_008.png".to_owned()];
     let exchanged = Finding::from(ExchangedReadings {
         circle: pair.clone(),
@@ -283,7 +278,7 @@ fn rows_that_were_exchanged_are_put_right_before_a_failed_result_is_tried_again(
         others_fit: false,
         table: "joints.csv",
     });
-    let (gate, mut record) = (Finding::from(doubted), record());
+    let (gate, mut record) = (Finding::from(contradicted_size()), record());
     record.findings = vec![(&gate).into(), (&exchanged).into()];
     assert_eq!(Verdict::of(&record).remedies, Vec::<String>::new());
     record.failed_gates = vec![gate.to_string()];

@@ -26,6 +26,24 @@ pub(super) fn text<'a>(files: &'a Files, name: &str) -> &'a str {
     std::str::from_utf8(bytes).unwrap()
 }
 
+/// The origin of a joint as kinematics.yaml states it, m and rad.
+#[derive(Debug, Deserialize, Clone, Copy)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Origin {
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    pub roll: f64,
+    pub pitch: f64,
+    pub yaw: f64,
+}
+
+impl Origin {
+    pub(super) fn pose(&self) -> Pose {
+        Pose::from_xyz_rpy([self.x, self.y, self.z], [self.roll, self.pitch, self.yaw])
+    }
+}
+
 pub(super) fn rows(files: &Files, name: &str) -> Vec<BTreeMap<String, String>> {
     csv::Reader::from_reader(text(files, name).as_bytes()).deserialize().map(|r| r.unwrap()).collect()
 }
@@ -86,15 +104,6 @@ fn kinematics_of_the_reread_urdf_are_those_of_the_rigid_model() {
 
 #[test]
 fn kinematics_yaml_says_the_same_as_the_urdf_that_it_belongs_to() {
-    #[derive(Deserialize)]
-    struct Origin {
-        x: f64,
-        y: f64,
-        z: f64,
-        roll: f64,
-        pitch: f64,
-        yaw: f64,
-    }
     let description = robot();
     let origins = |model: RobotModel, mark: &str| {
         let files = files(&solved(CameraMount::Hand, model), &context(&description)).unwrap();
@@ -103,9 +112,7 @@ fn kinematics_yaml_says_the_same_as_the_urdf_that_it_belongs_to() {
         let chain = chain_of(text(&files, &format!("kuka_kr6_r900.calibrated{mark}.urdf")));
         assert_eq!(yaml["kinematics"].len(), chain.joints.len());
         for joint in &chain.joints {
-            let o = &yaml["kinematics"][&joint.name];
-            let pose = Pose::from_xyz_rpy([o.x, o.y, o.z], [o.roll, o.pitch, o.yaw]);
-            let (angle, distance) = pose.distance(&joint.origin);
+            let (angle, distance) = yaml["kinematics"][&joint.name].pose().distance(&joint.origin);
             assert!(angle < 1e-12 && distance < 1e-15, "{}: {angle:e} {distance:e}", joint.name);
         }
         files

@@ -8,7 +8,7 @@ use robotcal::assess::Limits;
 use robotcal::calibration::{Ends, Inputs};
 use robotcal::frames::{Given, Knowledge, KnownRobot, TouchPlace, TouchRequest, Touches, fit, plan_touches};
 use robotcal::geom::{Pose, skew};
-use robotcal::identify::{Options, RobotModel, Solution, identify};
+use robotcal::identify::{Options, Solution, identify};
 use robotcal::linalg::SymmetricFactor;
 use robotcal::model::inverse::{reading_limits, solve_from};
 use robotcal::model::joint_terms::Term;
@@ -16,15 +16,13 @@ use robotcal::model::robot::{Posture, Robot};
 use robotcal::output::restore::found_model;
 use robotcal::output::solution_json;
 use robotcal::problem::Layout;
-use robotcal::series::{Plate, PlateKind};
+use robotcal::simulate::RobotErrors;
 use robotcal::simulate::truth::Truth;
-use robotcal::simulate::{RobotErrors, WorldRequest, series};
-use robotcal::study::measured;
-use robotcal::urdf::{Chain, read};
+use robotcal::urdf::Chain;
 
+use crate::programs_support::identified::identified_kr6;
 use crate::programs_support::touching::{Toucher, ranges, spread};
-use crate::robots::kr6_urdf;
-use crate::robots::repo;
+use crate::robots::{kr6_to_link_6, repo};
 
 /// Sigma of a touch per axis, m.
 const TOUCH_M: f64 = 5e-5;
@@ -187,28 +185,9 @@ impl Robots {
     }
 }
 
-fn kuka() -> Chain {
-    read(&kr6_urdf()).unwrap().chain(Some("base_link"), Some("link_6")).unwrap()
-}
-
 /// A KR 6 with errors of the size of the priors, identified from 40 stops.
 fn kr6(seed: u64, errors: RobotErrors) -> Robots {
-    let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
-    plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
-    let request = WorldRequest {
-        images: 40,
-        errors,
-        pixel_sigma_px: 0.05,
-        marker_sigma_m: 0.1e-3,
-        plate_modes: true,
-        least_markers: 12,
-        held_out: 2 * TARGETS,
-        seed,
-        ..WorldRequest::typical(kuka(), plate)
-    };
-    let made = series(&request).unwrap();
-    let options = Options { model: RobotModel::Full, ..Options::default() };
-    let s = identify(kuka(), &[measured(&made, &kuka())], &options).unwrap();
+    let (made, s) = identified_kr6(errors, 2 * TARGETS, seed);
     let joint_sigma = made.truth.joint_noise_sigma[0];
     let region = made.truth.held_out.iter().map(|h| h.readings.clone()).collect();
     println!(
@@ -216,7 +195,7 @@ fn kr6(seed: u64, errors: RobotErrors) -> Robots {
         s.fit.state.robot.terms.len(),
         s.fit.problem.joint_sigma(0).iter().map(|v| (1e6 * v).round() / 1e3).collect::<Vec<_>>()
     );
-    Robots { joint_sigma, region, ..Robots::of(&s, &kuka(), made.truth.robot(&kuka()).unwrap()) }
+    Robots { joint_sigma, region, ..Robots::of(&s, &kr6_to_link_6(), made.truth.robot(&kr6_to_link_6()).unwrap()) }
 }
 
 /// Frames of touches, as `compensate` uses them.

@@ -1,37 +1,20 @@
 //! What a corrected program promises in the base frame, against what simulated robots do.
 
+use crate::programs_support::identified::identified_kr6;
 use crate::robots::kr6_to_link_6;
 use rayon::prelude::*;
 use robotcal::assess::sigma_in_base;
 use robotcal::geom::Pose;
-use robotcal::identify::{Options, RobotModel, identify};
 use robotcal::model::inverse::{reading_limits, solve_from};
 use robotcal::model::robot::Robot;
-use robotcal::series::{Plate, PlateKind};
-use robotcal::simulate::{RobotErrors, WorldRequest, series};
-use robotcal::study::measured;
+use robotcal::simulate::RobotErrors;
 
 /// Targets of every program.
 const TARGETS: usize = 20;
 
 /// The sum of squares of error and of stated error over the targets of a world, m^2, and the mean square of their ratios.
 fn world(errors: RobotErrors, seed: u64) -> [f64; 3] {
-    let mut plate = Plate::lattice(PlateKind::Points, 8, 6, 0.038, 0.1e-3);
-    plate.markers.iter_mut().for_each(|m| m.outer_radius_m = 0.01);
-    let request = WorldRequest {
-        images: 40,
-        errors,
-        pixel_sigma_px: 0.05,
-        marker_sigma_m: 0.1e-3,
-        plate_modes: true,
-        least_markers: 12,
-        held_out: TARGETS,
-        seed,
-        ..WorldRequest::typical(kr6_to_link_6(), plate)
-    };
-    let made = series(&request).unwrap();
-    let options = Options { model: RobotModel::Full, ..Options::default() };
-    let s = identify(kr6_to_link_6(), &[measured(&made, &kr6_to_link_6())], &options).unwrap();
+    let (made, s) = identified_kr6(errors, TARGETS, seed);
     let found = s.exported_robot();
     let (nominal, truth) = (Robot::nominal(kr6_to_link_6()), made.truth.robot(&kr6_to_link_6()).unwrap());
     let limits = reading_limits(&nominal.chain);

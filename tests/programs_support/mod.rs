@@ -2,6 +2,7 @@
 
 #![allow(dead_code)]
 
+pub mod identified;
 pub mod text;
 pub mod touching;
 

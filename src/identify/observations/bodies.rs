@@ -43,24 +43,21 @@ pub(super) fn seen_bodies(named: NamedSeries) -> Vec<SeenBody> {
     let instrument = tracker.name.clone().unwrap_or_else(|| series.name.clone());
     // A tracker that is named sees the same bodies in every series.
     let body = |target: &str| if tracker.name.is_some() { target.to_owned() } else { named.qualified(target) };
-    let sigma_m = |row: Option<f64>| row.or(tracker.sigma_m).unwrap_or(DEFAULT_SIGMA.0);
-    let point = |row: &crate::series::PointRow| SeenBody {
-        stop: row.stop,
+    let tracked = |stop: usize, target: &str, seen: BodySeen, sigma_m: Option<f64>| SeenBody {
+        stop,
         instrument: instrument.clone(),
         kind: InstrumentKind::Tracker,
-        body: body(&row.target),
-        seen: BodySeen::Point(row.tracker_from_point_m),
-        sigma_m: sigma_m(row.sigma_m),
+        body: body(target),
+        seen,
+        sigma_m: sigma_m.or(tracker.sigma_m).unwrap_or(DEFAULT_SIGMA.0),
         sigma_rad: DEFAULT_SIGMA.1,
     };
+    let point = |row: &crate::series::PointRow| {
+        tracked(row.stop, &row.target, BodySeen::Point(row.tracker_from_point_m), row.sigma_m)
+    };
     let pose = |row: &crate::series::PoseRow| SeenBody {
-        stop: row.stop,
-        instrument: instrument.clone(),
-        kind: InstrumentKind::Tracker,
-        body: body(&row.target),
-        seen: BodySeen::Pose(row.tracker_from_target),
-        sigma_m: sigma_m(row.sigma_m),
         sigma_rad: row.sigma_rad.or(tracker.sigma_rad).unwrap_or(DEFAULT_SIGMA.1),
+        ..tracked(row.stop, &row.target, BodySeen::Pose(row.tracker_from_target), row.sigma_m)
     };
     let contact = series.manifest.contact.clone().unwrap_or_default();
     let touched = |row: &crate::series::ContactRow| {
