@@ -19,9 +19,9 @@ use super::vision::{camera_file, observation_table, plate_files, pose_files};
 use crate::assess::Limits;
 use crate::diagnose::Finding;
 use crate::error::{Notice, Result};
-use crate::identify::{PoseComparison, StandAlone, depths_m};
+use crate::identify::{PoseComparison, PoseSigma, StandAlone, depths_m};
 use crate::model::camera::Lens;
-use crate::problem::Adjustment;
+use crate::problem::{Adjustment, Image};
 use crate::series::InputFile;
 
 pub use super::vision::poses_record::FILE_NAME;
@@ -207,21 +207,15 @@ fn poses_record(
     })
 }
 
-fn record<'a>(
-    found: &'a StandAlone,
-    context: &'a StandAloneContext,
-    names: &'a ImageNames,
-    seen: &'a PosesRecord,
-) -> Record<'a> {
+fn cameras_of<'a>(found: &'a StandAlone) -> Vec<CameraOf<'a>> {
     let Adjustment { problem, state } = &found.fit.adjustment;
-    let covariance = &found.fit.covariance;
     let depths = depths_m(problem, &found.free_poses);
+    let value = |(column, value): (usize, &f64)| {
+        let is_free = problem.layout.columns[column].free;
+        Value { value: *value, sigma: is_free.then(|| found.fit.covariance.sigma(column)) }
+    };
     let camera = |(k, name): (usize, &'a String)| {
         let camera = &state.cameras[k];
-        let value = |(column, value): (usize, &f64)| {
-            let is_free = problem.layout.columns[column].free;
-            Value { value: *value, sigma: is_free.then(|| covariance.sigma(column)) }
-        };
         let values = problem.layout.cameras[k].clone().zip(&camera.parameters).map(value);
         CameraOf {
             name,
@@ -233,44 +227,59 @@ fn record<'a>(
             pixel_factor: problem.noise.pixel_factor[k],
         }
     };
+    problem.cameras.iter().enumerate().map(camera).collect()
+}
+
+fn image_of<'a>(name: &'a str, image: &Image, known: Option<&PoseSigma>) -> ImageOf<'a> {
+    ImageOf {
+        image: name,
+        left_out: image.rejected.as_ref().map(ToString::to_string),
+        observations: known.map(|s| s.observations),
+        rms_px: known.map(|s| s.rms_px),
+        position_sigma_m: known.map(|s| s.position_m),
+        rotation_sigma_rad: known.map(|s| s.rotation_rad),
+        camera_axes_m: known.map(|s| s.camera_axes_m),
+        centre_axes_m: known.map(|s| s.centre_axes_m),
+        correlation: known.map(|s| s.correlation),
+    }
+}
+
+fn against_of<'a>(file: &'a str, compared: &'a PoseComparison) -> AgainstOf<'a> {
+    AgainstOf {
+        file,
+        poses: compared.differences.len(),
+        rms_m: compared.rms[0],
+        rms_rad: compared.rms[1],
+        relative_scale: compared.relative_scale,
+        normalised_error_squared: compared.normalised,
+        twists: compared.differences.iter().map(|d| (d.image.as_str(), d.twist.into())).collect(),
+    }
+}
+
+fn record<'a>(
+    found: &'a StandAlone,
+    context: &'a StandAloneContext,
+    names: &'a ImageNames,
+    seen: &'a PosesRecord,
+) -> Record<'a> {
+    let problem = &found.fit.problem;
     let plate = |k: usize| PlateOf {
         name: plate_name(problem, &context.series, k),
         relative_scale: found.free_poses.scales[k].map(|s| Value { value: s.relative, sigma: Some(s.sigma) }),
     };
-    let sigmas: BTreeMap<usize, _> = seen.known.iter().map(|s| (s.image, s)).collect();
-    let image = |k: usize| {
-        let known = sigmas.get(&k);
-        ImageOf {
-            image: names.of(k),
-            left_out: problem.images[k].rejected.as_ref().map(ToString::to_string),
-            observations: known.map(|s| s.observations),
-            rms_px: known.map(|s| s.rms_px),
-            position_sigma_m: known.map(|s| s.position_m),
-            rotation_sigma_rad: known.map(|s| s.rotation_rad),
-            camera_axes_m: known.map(|s| s.camera_axes_m),
-            centre_axes_m: known.map(|s| s.centre_axes_m),
-            correlation: known.map(|s| s.correlation),
-        }
-    };
+    let sigmas: BTreeMap<usize, &PoseSigma> = seen.known.iter().map(|s| (s.image, s)).collect();
+    let image = |k: usize| image_of(names.of(k), &problem.images[k], sigmas.get(&k).copied());
     Record {
         format: 1,
         program: concat!("robotcal ", env!("CARGO_PKG_VERSION")),
         command: &context.command,
         inputs: &context.inputs,
-        cameras: problem.cameras.iter().enumerate().map(camera).collect(),
+        cameras: cameras_of(found),
         plates: (0..problem.plates.len()).map(plate).collect(),
         images: (0..problem.images.len()).map(image).collect(),
         statistics: &seen.statistics,
         covariance_together: None,
-        against: context.against.as_ref().map(|(file, c)| AgainstOf {
-            file,
-            poses: c.differences.len(),
-            rms_m: c.rms[0],
-            rms_rad: c.rms[1],
-            relative_scale: c.relative_scale,
-            normalised_error_squared: c.normalised,
-            twists: c.differences.iter().map(|d| (d.image.as_str(), d.twist.into())).collect(),
-        }),
+        against: context.against.as_ref().map(|(file, compared)| against_of(file, compared)),
         findings: found.findings.iter().map(FindingRecord::from).collect(),
         notices: context.notices.iter().map(Notice::coded).collect(),
         files: seen.files.clone(),

@@ -73,15 +73,7 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
     let name = folder_name(folder)?;
     let manifest_path = folder.join("series.toml");
     if !manifest_path.exists() {
-        let recording = written_in(folder).into_iter().next().filter(|_| !folder.join("images").exists());
-        let remedy = match recording {
-            Some(recording) => format!("give the recording that it holds: {}", recording.display()),
-            None => format!(
-                "give the folder that holds it; `robotcal doctor {}` says what a series needs",
-                files::word(folder.display())
-            ),
-        };
-        return Err(Error::new(Code::SeriesMissing, folder.display(), "holds no series.toml", remedy));
+        return Err(no_manifest(folder));
     }
     let mut inputs = Vec::new();
     let manifest = Manifest::read(&manifest_path, &mut inputs)?;
@@ -131,6 +123,18 @@ fn read_folder(folder: &Path, use_observations: bool) -> Result<Series> {
         series.source = Source::Cameras(views);
     }
     Ok(series)
+}
+
+fn no_manifest(folder: &Path) -> Error {
+    let recording = written_in(folder).into_iter().next().filter(|_| !folder.join("images").exists());
+    let remedy = match recording {
+        Some(recording) => format!("give the recording that it holds: {}", recording.display()),
+        None => format!(
+            "give the folder that holds it; `robotcal doctor {}` says what a series needs",
+            files::word(folder.display())
+        ),
+    };
+    Error::new(Code::SeriesMissing, folder.display(), "holds no series.toml", remedy)
 }
 
 /// What trackers and contacts measured at the stops of the cameras: a view of all stops, without images.

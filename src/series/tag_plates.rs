@@ -81,68 +81,70 @@ pub(super) struct TagKeys {
     pub id: Option<u32>,
 }
 
+/// Refuses a plate of more tags than any has, and tags of a size that is not in metres.
+fn require_tag_board(path: &Path, tags: &Tags, [columns, rows]: [u32; 2]) -> Result<()> {
+    if [columns, rows].iter().any(|n| !(1..=1000).contains(n)) || columns * rows > 100_000 {
+        let what = format!("columns = {columns}, rows = {rows}");
+        let remedy = "give the numbers of tags, 1 to 1000 of each";
+        return Err(Error::new(Code::SettingRange, path.display(), what, remedy));
+    }
+    if tags.side_m >= 1.0 {
+        let what = format!("a tag has a side of {} m", tags.side_m);
+        let remedy = "sizes are in metres: 40 mm are 0.04";
+        return Err(Error::new(Code::PlateUnitUnlikely, path.display(), what, remedy));
+    }
+    Ok(())
+}
+
 impl TagKeys {
     /// The tags of a plate of this kind, and its columns and rows.
     ///
     /// # Errors
     /// Missing keys, or such as the kind does not have.
     pub(super) fn tags(&self, path: &Path, kind: PlateKind, size: [Option<u32>; 2]) -> Result<(Tags, [u32; 2])> {
-        let missing = |keys: &str| {
+        let board = size[0].zip(size[1]).map(|(columns, rows)| [columns, rows]);
+        let (keys, stated) = match kind {
+            PlateKind::Aprilgrid => ("columns, rows, tag_m and spacing", self.aprilgrid().zip(board)),
+            PlateKind::ArucoGrid => ("columns, rows, marker_m, gap_m and dictionary", self.aruco_grid().zip(board)),
+            _ => ("tag_m, id and family or dictionary", self.single().map(|tag| (tag, [1, 1]))),
+        };
+        let (tags, size) = stated.ok_or_else(|| {
             let what = format!("{keys} are needed for a plate of this kind");
             Error::new(Code::SettingMissing, path.display(), what, "add what is missing (lengths in metres)")
-        };
-        let board = size[0].zip(size[1]).map(|(columns, rows)| [columns, rows]);
-        let number = |value: Option<f64>, keys: &str| value.ok_or_else(|| missing(keys));
-        let (tags, size) = match kind {
-            PlateKind::Aprilgrid => {
-                let keys = "columns, rows, tag_m and spacing";
-                let side_m = number(self.tag_m, keys)?;
-                let gap_m = side_m * number(self.spacing, keys)?;
-                let dictionary = dictionary_of(self.family.as_deref().unwrap_or("36h11"));
-                let first_id = self.first_id.unwrap_or(0);
-                let tags = Tags { dictionary, print: TagPrint::Kalibr, side_m, gap_m, first_id };
-                (tags, board.ok_or_else(|| missing(keys))?)
-            }
-            PlateKind::ArucoGrid => {
-                let keys = "columns, rows, marker_m, gap_m and dictionary";
-                let (side_m, gap_m) = (number(self.marker_m, keys)?, number(self.gap_m, keys)?);
-                let dictionary = self.dictionary.clone().ok_or_else(|| missing(keys))?;
-                let first_id = self.first_id.unwrap_or(0);
-                let tags = Tags { dictionary, print: TagPrint::Opencv, side_m, gap_m, first_id };
-                (tags, board.ok_or_else(|| missing(keys))?)
-            }
-            _ => {
-                let keys = "tag_m, id and family or dictionary";
-                let side_m = number(self.tag_m, keys)?;
-                let (dictionary, print) = match (&self.family, &self.dictionary) {
-                    (Some(family), None) => (dictionary_of(family), TagPrint::Apriltag),
-                    (None, Some(dictionary)) => (dictionary.clone(), TagPrint::Opencv),
-                    _ => return Err(missing(keys)),
-                };
-                let first_id = self.id.ok_or_else(|| missing(keys))?;
-                (Tags { dictionary, print, side_m, gap_m: 0.0, first_id }, [1, 1])
-            }
-        };
-        if size.iter().any(|n| !(1..=1000).contains(n)) || size[0] * size[1] > 100_000 {
-            let what = format!("columns = {}, rows = {}", size[0], size[1]);
-            return Err(Error::new(
-                Code::SettingRange,
-                path.display(),
-                what,
-                "give the numbers of tags, 1 to 1000 of each",
-            ));
-        }
-        if tags.side_m >= 1.0 {
-            let what = format!("a tag has a side of {} m", tags.side_m);
-            return Err(Error::new(
-                Code::PlateUnitUnlikely,
-                path.display(),
-                what,
-                "sizes are in metres: 40 mm are 0.04",
-            ));
-        }
+        })?;
+        require_tag_board(path, &tags, size)?;
         tags.dictionary(&path.display().to_string(), size[0] * size[1])?;
         Ok((tags, size))
+    }
+
+    fn aprilgrid(&self) -> Option<Tags> {
+        let side_m = self.tag_m?;
+        Some(Tags {
+            dictionary: dictionary_of(self.family.as_deref().unwrap_or("36h11")),
+            print: TagPrint::Kalibr,
+            side_m,
+            gap_m: side_m * self.spacing?,
+            first_id: self.first_id.unwrap_or(0),
+        })
+    }
+
+    fn aruco_grid(&self) -> Option<Tags> {
+        Some(Tags {
+            dictionary: self.dictionary.clone()?,
+            print: TagPrint::Opencv,
+            side_m: self.marker_m?,
+            gap_m: self.gap_m?,
+            first_id: self.first_id.unwrap_or(0),
+        })
+    }
+
+    fn single(&self) -> Option<Tags> {
+        let (dictionary, print) = match (&self.family, &self.dictionary) {
+            (Some(family), None) => (dictionary_of(family), TagPrint::Apriltag),
+            (None, Some(dictionary)) => (dictionary.clone(), TagPrint::Opencv),
+            _ => return None,
+        };
+        Some(Tags { dictionary, print, side_m: self.tag_m?, gap_m: 0.0, first_id: self.id? })
     }
 
     /// The keys that say what these tags are.

@@ -18,30 +18,16 @@ fn legend() -> Vec<String> {
 
 /// What the figures say, in words.
 pub fn study_verdict(study: &Study) -> Vec<String> {
-    let (mut wins, mut ties, mut losses) = (Vec::new(), Vec::new(), Vec::new());
-    // Best two-stage estimator that knows the repeatability, against F.
-    for cell in &study.cells {
-        let rivals = cell.to_joint[..4].iter().flatten();
-        let Some(best) = rivals.copied().min_by(|a, b| a.value.total_cmp(&b.value)) else { continue };
-        let list = if best.low > 1.0 {
-            &mut wins
-        } else if best.high < 1.0 {
-            &mut losses
-        } else {
-            &mut ties
-        };
-        list.push((cell, best));
-    }
-    let place = |c: &StudyCell| format!("ratio {} with {} markers", c.ratio, c.markers);
+    let (wins, losses, ties) = outcomes(study);
     let list = |cells: &[(&StudyCell, Ratio)]| -> String {
+        let place = |c: &StudyCell| format!("ratio {} with {} markers", c.ratio, c.markers);
         cells.iter().map(|(c, r)| format!("{} ({:.3})", place(c), r.value)).collect::<Vec<_>>().join(", ")
     };
     let mut words = vec![format!(
         "The joint fit with joint noise (F) is better than every two-stage fit (A to D), beyond the 95 % interval, in {} of {} cells; \
-         no difference is seen in {}; the best two-stage fit is better in {}.",
+         no difference is seen in {ties}; the best two-stage fit is better in {}.",
         wins.len(),
         study.cells.len(),
-        ties.len(),
         losses.len()
     )];
     if !wins.is_empty() {
@@ -50,18 +36,7 @@ pub fn study_verdict(study: &Study) -> Vec<String> {
     if !losses.is_empty() {
         words.push(format!("Joint loses at: {}.", list(&losses)));
     }
-    let extreme = |k: usize, f: fn(f64, f64) -> f64, start: f64| {
-        study.cells.iter().filter_map(|c| c.to_joint[k]).map(|r| r.value).fold(start, f)
-    };
-    for (k, e) in Estimator::ALL.iter().enumerate().take(5) {
-        words.push(format!(
-            "{} ({}): error {:.2} to {:.2} times that of F.",
-            e.letter(),
-            e.title(),
-            extreme(k, f64::min, f64::INFINITY),
-            extreme(k, f64::max, 0.0)
-        ));
-    }
+    words.extend(Estimator::ALL.iter().enumerate().take(5).map(|(k, e)| range(study, k, e)));
     let worst = |least_noise: f64| {
         let cells = study.cells.iter().filter(|c| c.joint_noise_rad >= least_noise);
         cells.map(StudyCell::joint_over_best).fold(0.0, f64::max)
@@ -72,6 +47,36 @@ pub fn study_verdict(study: &Study) -> Vec<String> {
         worst(f64::MIN_POSITIVE)
     ));
     words
+}
+
+/// Cells in which F is better than the best two-stage estimator that knows the repeatability, and those in which it is worse, each with the ratio of
+/// their errors; and how many show no difference.
+fn outcomes(study: &Study) -> (Vec<(&StudyCell, Ratio)>, Vec<(&StudyCell, Ratio)>, usize) {
+    let (mut wins, mut losses, mut ties) = (Vec::new(), Vec::new(), 0);
+    for cell in &study.cells {
+        let rivals = cell.to_joint[..4].iter().flatten();
+        match rivals.copied().min_by(|a, b| a.value.total_cmp(&b.value)) {
+            Some(best) if best.low > 1.0 => wins.push((cell, best)),
+            Some(best) if best.high < 1.0 => losses.push((cell, best)),
+            Some(_) => ties += 1,
+            None => {}
+        }
+    }
+    (wins, losses, ties)
+}
+
+/// Least and largest error of an estimator over that of F.
+fn range(study: &Study, k: usize, estimator: &Estimator) -> String {
+    let extreme = |f: fn(f64, f64) -> f64, start: f64| {
+        study.cells.iter().filter_map(|c| c.to_joint[k]).map(|r| r.value).fold(start, f)
+    };
+    format!(
+        "{} ({}): error {:.2} to {:.2} times that of F.",
+        estimator.letter(),
+        estimator.title(),
+        extreme(f64::min, f64::INFINITY),
+        extreme(f64::max, 0.0)
+    )
 }
 
 fn study_setup(study: &Study) -> String {
@@ -123,62 +128,86 @@ td,th{border:1px solid #ccc;padding:3px 6px;text-align:right}small{color:#555}";
 
 const COLOURS: [&str; 6] = ["#8c8c8c", "#b8860b", "#2a8f5b", "#1f5fbf", "#c0392b", "#000000"];
 
-/// One panel for each plate: error over that of F, logarithmic, against the ratio.
-fn panel(cells: &[&StudyCell], title: &str) -> String {
-    let (w, h, left, top) = (360.0, 250.0, 46.0, 26.0);
-    let (width, height) = (w - left - 12.0, h - top - 40.0);
-    let values = || cells.iter().flat_map(|c| c.to_joint.iter().flatten().map(|r| r.value));
-    let high = values().fold(2.0, f64::max).log10() + 0.05;
-    let low = values().fold(0.9, f64::min).log10() - 0.02;
-    let x = |k: usize| left + width * (k as f64 + 0.5) / cells.len() as f64;
-    let y = |v: f64| top + height * (high - v.log10()) / (high - low);
-    let mut svg = format!(
-        "<svg viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\" font-family=\"sans-serif\" font-size=\"11\"><text x=\"{left}\" y=\"14\" font-weight=\"bold\">{title}</text>"
-    );
-    for tick in [0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0]
-        .into_iter()
-        .filter(|t| (low..=high).contains(&f64::log10(*t)))
-    {
-        let _ = write!(
-            svg,
-            "<line x1=\"{left}\" x2=\"{:.1}\" y1=\"{1:.1}\" y2=\"{1:.1}\" stroke=\"#ddd\"/><text x=\"{2:.1}\" y=\"{3:.1}\" text-anchor=\"end\">{tick}</text>",
-            left + width,
-            y(tick),
-            left - 4.0,
-            y(tick) + 4.0
-        );
+/// The field of a panel in its picture: cells from left to right, errors over that of F upwards, logarithmic.
+struct Field {
+    left: f64,
+    top: f64,
+    width: f64,
+    height: f64,
+    cells: f64,
+    /// Decadic logarithms of the least and the largest error.
+    low: f64,
+    high: f64,
+}
+
+impl Field {
+    fn x(&self, cell: usize) -> f64 {
+        self.left + self.width * (cell as f64 + 0.5) / self.cells
     }
-    for (k, c) in cells.iter().enumerate() {
-        let _ = write!(
-            svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
-            x(k),
-            top + height + 15.0,
-            c.ratio
-        );
+
+    fn y(&self, error: f64) -> f64 {
+        self.top + self.height * (self.high - error.log10()) / (self.high - self.low)
     }
-    let _ = write!(
-        svg,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">repeatability / pose error</text>",
-        left + width / 2.0,
-        h - 8.0
-    );
-    for (e, colour) in COLOURS.iter().enumerate() {
+
+    /// Horizontal lines with their numbers.
+    fn grid(&self, svg: &mut String) {
+        let ticks = [0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0];
+        for tick in ticks.into_iter().filter(|t| (self.low..=self.high).contains(&f64::log10(*t))) {
+            let _ = write!(
+                svg,
+                "<line x1=\"{0}\" x2=\"{1:.1}\" y1=\"{2:.1}\" y2=\"{2:.1}\" stroke=\"#ddd\"/><text x=\"{3:.1}\" y=\"{4:.1}\" text-anchor=\"end\">{tick}</text>",
+                self.left,
+                self.left + self.width,
+                self.y(tick),
+                self.left - 4.0,
+                self.y(tick) + 4.0
+            );
+        }
+    }
+
+    /// The errors of an estimator as a line, with their intervals where it is not F itself.
+    fn curve(&self, svg: &mut String, cells: &[&StudyCell], estimator: usize) {
+        let colour = COLOURS[estimator];
         let mut points = String::new();
         for (k, c) in cells.iter().enumerate() {
-            let Some(r) = c.to_joint[e] else { continue };
-            let _ = write!(points, "{:.1},{:.1} ", x(k), y(r.value));
-            if e < 5 {
-                let (a, b) = (y(r.low.max(10f64.powf(low))), y(r.high));
+            let Some(r) = c.to_joint[estimator] else { continue };
+            let _ = write!(points, "{:.1},{:.1} ", self.x(k), self.y(r.value));
+            if estimator < 5 {
+                let (a, b) = (self.y(r.low.max(10f64.powf(self.low))), self.y(r.high));
                 let _ = write!(
                     svg,
                     "<line x1=\"{0:.1}\" x2=\"{0:.1}\" y1=\"{a:.1}\" y2=\"{b:.1}\" stroke=\"{colour}\" stroke-opacity=\"0.5\"/>",
-                    x(k) + 2.0 * (e as f64 - 2.0)
+                    self.x(k) + 2.0 * (estimator as f64 - 2.0)
                 );
             }
         }
         let _ = write!(svg, "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.6\"/>");
     }
+}
+
+/// One panel for each plate: error over that of F, logarithmic, against the ratio.
+fn panel(cells: &[&StudyCell], title: &str) -> String {
+    let (w, h, left, top) = (360.0, 250.0, 46.0, 26.0);
+    let values = || cells.iter().flat_map(|c| c.to_joint.iter().flatten().map(|r| r.value));
+    let field = Field {
+        left,
+        top,
+        width: w - left - 12.0,
+        height: h - top - 40.0,
+        cells: cells.len() as f64,
+        low: values().fold(0.9, f64::min).log10() - 0.02,
+        high: values().fold(2.0, f64::max).log10() + 0.05,
+    };
+    let mut svg = format!(
+        "<svg viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\" font-family=\"sans-serif\" font-size=\"11\"><text x=\"{left}\" y=\"14\" font-weight=\"bold\">{title}</text>"
+    );
+    field.grid(&mut svg);
+    let mut centred = |x: f64, y: f64, text: &dyn std::fmt::Display| {
+        let _ = write!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">{text}</text>");
+    };
+    cells.iter().enumerate().for_each(|(k, c)| centred(field.x(k), top + field.height + 15.0, &c.ratio));
+    centred(left + field.width / 2.0, h - 8.0, &"repeatability / pose error");
+    (0..COLOURS.len()).for_each(|estimator| field.curve(&mut svg, cells, estimator));
     svg.push_str("</svg>");
     svg
 }

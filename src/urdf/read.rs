@@ -67,6 +67,28 @@ fn refuse_no_text(path: &Path, bytes: &[u8]) -> Result<()> {
     Err(Error::new(Code::UrdfSyntax, path.display(), what, "give a URDF file"))
 }
 
+/// What the library reads in a description that has so many links and joints.
+fn read_by_urdf_rs(path: &Path, skeleton: &str, (links, joints): (usize, usize)) -> Result<urdf_rs::Robot> {
+    let refused = |what: String| Error::new(Code::UrdfSyntax, path.display(), what, "check the file with check_urdf");
+    let read = urdf_rs::read_from_string(skeleton.trim_start_matches('\u{feff}'));
+    let read = read.map_err(|e| refused(format!("urdf-rs cannot read it: {e}")))?;
+    match read.joints.len() == joints && read.links.len() == links {
+        true => Ok(read),
+        false => Err(refused("two readers disagree on the number of its links and joints".to_owned())),
+    }
+}
+
+/// Mass and centre of mass of the links that state them, by link name.
+fn inertials_of(source: &Source<'_>, robot: Node<'_, '_>, links: &[String]) -> Result<BTreeMap<String, Inertial>> {
+    let mut all = BTreeMap::new();
+    for (node, link) in elements(robot, "link").zip(links) {
+        if let Some(found) = inertial(source, node, link)? {
+            all.insert(link.clone(), found);
+        }
+    }
+    Ok(all)
+}
+
 impl RobotDescription {
     /// Reads a URDF from its text; `path` is for messages only.
     ///
@@ -92,50 +114,35 @@ impl RobotDescription {
         let joint_nodes: Vec<_> = elements(robot, "joint").collect();
         named(&source, robot, "joint")?;
         joint_nodes.iter().try_for_each(|n| source.check(*n))?;
-
-        let skeleton = skeleton(&plain, robot);
-        let read = urdf_rs::read_from_string(skeleton.trim_start_matches('\u{feff}')).map_err(|e| {
-            let what = format!("urdf-rs cannot read it: {e}");
-            Error::new(Code::UrdfSyntax, path.display(), what, "check the file with check_urdf")
-        })?;
-        if read.joints.len() != joint_nodes.len() || read.links.len() != links.len() {
-            let what = "two readers disagree on the number of its links and joints";
-            return Err(Error::new(Code::UrdfSyntax, path.display(), what, "check the file with check_urdf"));
-        }
+        let read = read_by_urdf_rs(path, &skeleton(&plain, robot), (links.len(), joint_nodes.len()))?;
         let mut notices = Vec::new();
         let joints = joint_nodes
             .iter()
             .zip(&read.joints)
             .map(|(node, joint)| source.joint(*node, joint, &mut notices))
             .collect::<Result<Vec<_>>>()?;
-        let mut inertials = BTreeMap::new();
-        for (node, link) in elements(robot, "link").zip(&links) {
-            if let Some(found) = inertial(&source, node, link)? {
-                inertials.insert(link.clone(), found);
-            }
-        }
         let mut description = Self {
             path: path.to_path_buf(),
             name: read.name,
             notices,
+            inertials: inertials_of(&source, robot, &links)?,
             links,
             joint_above: joints.iter().enumerate().map(|(k, j)| (j.child.clone(), k)).collect(),
             joints,
-            inertials,
             text: String::new(),
         };
         description.check_tree()?;
-        if let Some(mass) = description.placeholder_mass() {
-            let what =
-                format!("all links have the same mass ({mass} kg): a placeholder, not used for the sag of the joints");
-            description.notices.push(Notice::new(
-                Code::UrdfMassPlaceholder,
-                path.display(),
-                what,
-                "state the true masses and centres, or none",
-            ));
-        }
+        let placeholder = description.placeholder_notice();
+        description.notices.extend(placeholder);
         Ok(Self { text, ..description })
+    }
+
+    fn placeholder_notice(&self) -> Option<Notice> {
+        let mass = self.placeholder_mass()?;
+        let what =
+            format!("all links have the same mass ({mass} kg): a placeholder, not used for the sag of the joints");
+        let remedy = "state the true masses and centres, or none";
+        Some(Notice::new(Code::UrdfMassPlaceholder, self.path.display(), what, remedy))
     }
 
     /// Mass and centre of mass of every link whose URDF states an `<inertial>`, by link name.

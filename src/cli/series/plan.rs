@@ -33,7 +33,7 @@ use crate::plan::setting::{Beside, PlannedStop, Setting, images_of};
 use crate::plan::viewpoint::ViewRange;
 use crate::plan::visibility::VisibilityLimits;
 use crate::plan::{
-    Budget, Demand, Forecast, PlaceForecast, Plan, PlanRequest, check_demand, choose, compare_places, forecast,
+    Budget, Demand, Forecast, Gain, PlaceForecast, Plan, PlanRequest, check_demand, choose, compare_places, forecast,
     image_name, place_words, plan,
 };
 use crate::series::{CameraMount, read_plate};
@@ -534,6 +534,19 @@ fn camera(args: &PlanArgs) -> Result<Camera> {
 /// Poses whose gain is said on the terminal.
 const GAINS_SHOWN: usize = 10;
 
+fn gain_text(g: &Gain) -> String {
+    format!(
+        "helps     {} by itself: flange {:.4} -> {:.4} mm, {:.4} mm better; most by {}: sigma {} -> {}\n",
+        image_name(g.leg),
+        1e3 * g.flange_m[0],
+        1e3 * g.flange_m[1],
+        1e3 * g.gain_m(),
+        g.parameter,
+        sigma_text(g.sigma[0], g.unit),
+        sigma_text(g.sigma[1], g.unit),
+    )
+}
+
 fn summary(
     request: &PlanRequest,
     plan: &Plan,
@@ -560,12 +573,8 @@ fn summary(
         ""
     );
     for point in &forecast.curve {
-        text += &format!(
-            "          {:4} images: {:.3} mm ({:.3} mm at random)\n",
-            point.images,
-            1e3 * point.planned_m,
-            1e3 * point.random_m
-        );
+        let [planned_mm, random_mm] = [point.planned_m, point.random_m].map(|m| 1e3 * m);
+        text += &format!("          {:4} images: {planned_mm:.3} mm ({random_mm:.3} mm at random)\n", point.images);
     }
     let taught = plan.legs.iter().filter(|l| !l.is_free).count();
     if taught > 0 {
@@ -579,18 +588,7 @@ fn summary(
         text += &format!("remark    {line}\n");
     }
     if !request.taken.is_empty() {
-        for g in forecast.gains.iter().take(GAINS_SHOWN) {
-            text += &format!(
-                "helps     {} by itself: flange {:.4} -> {:.4} mm, {:.4} mm better; most by {}: sigma {} -> {}\n",
-                image_name(g.leg),
-                1e3 * g.flange_m[0],
-                1e3 * g.flange_m[1],
-                1e3 * g.gain_m(),
-                g.parameter,
-                sigma_text(g.sigma[0], g.unit),
-                sigma_text(g.sigma[1], g.unit),
-            );
-        }
+        forecast.gains.iter().take(GAINS_SHOWN).for_each(|gain| text += &gain_text(gain));
     }
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
     text += &format!("written   {}: {}\n", folder.display(), names.join(", "));

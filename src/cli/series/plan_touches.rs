@@ -62,24 +62,9 @@ pub(super) fn run(
     let record = read_solution(from)?;
     let found = exported_model(&record)?;
     let robot = found.known_robot(None)?;
-    let positive = |flag: &str, value: f64, most: f64| match value > 0.0 && value <= most {
-        true => Ok(value),
-        false => {
-            Err(Error::new(Code::OptionRange, flag, format!("{value}"), format!("give a number between 0 and {most}")))
-        }
-    };
     let chain = &robot.exported().chain;
     let wanted = targets.read(chain)?.unwrap_or_default();
-    let request = TouchRequest {
-        points: read_points(points, &found.limits)?,
-        tool: pose("--touch-tool", &args.touch_tool)?.unwrap_or_else(Pose::identity),
-        work: pose("--touch-work", &args.touch_work)?.unwrap_or_else(Pose::identity),
-        count,
-        sigma_m: 1e-3 * positive("--touch-sigma-mm", args.touch_sigma_mm, 10.0)?,
-        tilt_rad: positive("--touch-tilt-deg", args.touch_tilt_deg, 90.0)?.to_radians(),
-        targets: wanted.iter().map(|q| Posture::at(q)).collect(),
-        tries: TRIES,
-    };
+    let request = request(args, read_points(points, &found.limits)?, &wanted, count)?;
     plain_name("frame", &args.touch_frame, "--touch-frame")?;
     let fewest = found.limits.fewest_touches;
     if count < fewest {
@@ -108,6 +93,30 @@ pub(super) fn run(
         );
     }
     Ok(Verdict::Good)
+}
+
+fn request(
+    args: &TouchArgs,
+    points: Vec<(String, Vector3<f64>)>,
+    targets: &[Vec<f64>],
+    count: usize,
+) -> Result<TouchRequest> {
+    let positive = |flag: &str, value: f64, most: f64| match value > 0.0 && value <= most {
+        true => Ok(value),
+        false => {
+            Err(Error::new(Code::OptionRange, flag, format!("{value}"), format!("give a number between 0 and {most}")))
+        }
+    };
+    Ok(TouchRequest {
+        points,
+        tool: pose("--touch-tool", &args.touch_tool)?.unwrap_or_else(Pose::identity),
+        work: pose("--touch-work", &args.touch_work)?.unwrap_or_else(Pose::identity),
+        count,
+        sigma_m: 1e-3 * positive("--touch-sigma-mm", args.touch_sigma_mm, 10.0)?,
+        tilt_rad: positive("--touch-tilt-deg", args.touch_tilt_deg, 90.0)?.to_radians(),
+        targets: targets.iter().map(|q| Posture::at(q)).collect(),
+        tries: TRIES,
+    })
 }
 
 /// Points of a work object.

@@ -160,52 +160,55 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
     let limits = setting.limits;
     let explains_most = step.explains_most;
     let weight = |matters: bool| if matters && explains_most { Weight::Gate } else { Weight::Note };
-    if let Changed::Zero(reading) = step.changed {
-        let chain = &fit.state.robot.chain;
-        let (joint, kind) = (chain.readings[reading].clone(), chain.reading_kinds[reading]);
-        let repeats_to = if kind == JointKind::Prismatic { limits.displaced_m } else { limits.displaced_rad };
-        let offset = (step.change[0], step.covariance[(0, 0)].sqrt());
-        let weight = weight(offset.0.abs() > repeats_to);
-        let (stops, share) = (images, step.share);
-        return Some(ZeroMoved { joint, kind, series, displacement, stops, offset, share, weight }.into());
+    match step.changed {
+        Changed::Zero(reading) => {
+            let chain = &fit.state.robot.chain;
+            let (joint, kind) = (chain.readings[reading].clone(), chain.reading_kinds[reading]);
+            let repeats_to = if kind == JointKind::Prismatic { limits.displaced_m } else { limits.displaced_rad };
+            let offset = (step.change[0], step.covariance[(0, 0)].sqrt());
+            let weight = weight(offset.0.abs() > repeats_to);
+            let (stops, share) = (images, step.share);
+            Some(ZeroMoved { joint, kind, series, displacement, stops, offset, share, weight }.into())
+        }
+        Changed::Focal(camera) => refocused(step, fit, camera, images.into_iter().next()?, explains_most, setting),
+        Changed::Centre(camera) => Some(ImagesShifted::of(step, problem, camera, images).into()),
+        Changed::Place { first, .. } => {
+            let matters = step.size(0).0 > limits.displaced_m;
+            Some(PlaceMisstated::of(step, problem, first, (series, images), weight(matters)).into())
+        }
+        _ => {
+            let (distance_m, angle_rad) = (step.size(0), (step.change.len() > 3).then(|| step.size(3)));
+            let is_turned = angle_rad.is_some_and(|angle| angle.0 > limits.displaced_rad);
+            let matters = distance_m.0 > limits.displaced_m || is_turned;
+            let (body, mounting) = carried(step, first, problem)?;
+            Some(
+                Displaced {
+                    series,
+                    body,
+                    places: places(step, body, problem),
+                    mounting,
+                    displacement,
+                    images,
+                    distance_m,
+                    angle_rad,
+                    share: step.share,
+                    explains_most,
+                    weight: weight(matters),
+                }
+                .into(),
+            )
+        }
     }
-    if let Changed::Focal(camera) = step.changed {
-        return refocused(step, fit, camera, images.into_iter().next()?, explains_most, setting);
-    }
-    if let Changed::Centre(camera) = step.changed {
-        return Some(ImagesShifted::of(step, problem, camera, images).into());
-    }
-    if let Changed::Place { first, .. } = step.changed {
-        let matters = step.size(0).0 > limits.displaced_m;
-        return Some(PlaceMisstated::of(step, problem, first, (series, images), weight(matters)).into());
-    }
-    let (distance_m, angle_rad) = (step.size(0), (step.change.len() > 3).then(|| step.size(3)));
-    let matters = distance_m.0 > limits.displaced_m || angle_rad.is_some_and(|angle| angle.0 > limits.displaced_rad);
-    let weight = weight(matters);
-    let (body, mounting) = carried(step, first, problem)?;
-    let places = match body {
+}
+
+/// Names of the sockets that moved; none where it is another body.
+fn places(step: &Step, body: Carried, problem: &Problem) -> Vec<String> {
+    match body {
         Carried::Socket => names(&sockets(step, problem), problem),
         Carried::Fixture | Carried::FixtureOfSome => names(&told_sockets(step, problem), problem),
         _ => Vec::new(),
-    };
-    Some(
-        Displaced {
-            series,
-            body,
-            places,
-            mounting,
-            displacement,
-            images,
-            distance_m,
-            angle_rad,
-            share: step.share,
-            explains_most,
-            weight,
-        }
-        .into(),
-    )
+    }
 }
-
 /// The sockets that it moves.
 fn sockets(step: &Step, problem: &Problem) -> BTreeSet<usize> {
     step.shown.iter().filter_map(|shown| shown.socket(problem)).collect()

@@ -262,60 +262,69 @@ pub fn expected_findings(
     meant: &Meant,
     subject: &str,
 ) -> Vec<FileFinding> {
-    let remedy =
-        "measure them with a few touches (robotcal frames) and give --frames frames.json, or say --frames nominal";
-    let finding =
-        |code, weight, quantities, text| FileFinding { code, weight, subject: subject.to_owned(), quantities, text };
     let shifts: Vec<f64> = (done.outcomes.iter())
         .filter_map(|o| if let TargetOutcome::Done(c) = o { Some(1e3 * c.shift_m) } else { None })
         .collect();
     if shifts.is_empty() {
         return Vec::new();
     }
-    let correction_mm = rms(&shifts);
-    let mut all = Vec::new();
-    let unknown = match expected {
-        Ok(each) => {
-            let mm: Vec<f64> = each.iter().flatten().map(|m| 1e3 * m).collect();
-            let (rms_mm, max_mm) = (rms(&mm), largest(&mm));
-            let quantities = numbers([("targets", mm.len() as f64), ("rms_mm", rms_mm), ("max_mm", max_mm)]);
-            let text = match meant {
-                Meant::Measured(what) => format!(
-                    "the tool is expected {rms_mm:.3} mm RMS ({max_mm:.3} mm at most) from where the program meant it, joint noise included, with {what}"
-                ),
-                _ => format!(
-                    "in the base frame the tool is expected {rms_mm:.2} mm RMS ({max_mm:.2} mm at most) from where the program meant it: images do not tell where base and tool stand"
-                ),
-            };
-            all.push(finding(Code::ExpectedError, Weight::Note, quantities, text));
-            Some(rms_mm)
-        }
-        Err(why) => {
-            let text = format!(
-                "how far the tool will be from where the program meant it is not known ({why}); base and tool are usually wrong by millimetres"
-            );
-            all.push(finding(Code::ExpectedErrorUnknown, Weight::Note, BTreeMap::new(), text));
-            None
-        }
+    let errors_mm: std::result::Result<Vec<f64>, &str> =
+        expected.map(|each| each.iter().flatten().map(|m| 1e3 * m).collect());
+    let (unknown_mm, correction_mm) = (errors_mm.as_ref().ok().map(|mm| rms(mm)), rms(&shifts));
+    let error = match &errors_mm {
+        Ok(mm) => error_known(mm, meant, subject),
+        Err(why) => error_unknown(why, subject),
     };
-    match meant {
-        Meant::Untold if unknown.is_none_or(|mm| mm > correction_mm) => {
-            let size = unknown
-                .map_or_else(|| "by an unknown amount".to_owned(), |mm| format!("by {mm:.2} mm RMS at the targets"));
-            let text = format!(
-                "base and tool of the real robot are unknown {size}, and the correction itself is {correction_mm:.2} mm RMS: the program repeats the shape of what was meant, and is not corrected; {remedy}"
-            );
-            let known = unknown.map(|mm| ("unknown_mm", mm)).into_iter();
-            let quantities = known.chain([("correction_mm", correction_mm)]).map(|(n, v)| (n.to_owned(), v)).collect();
-            all.push(finding(Code::FramesUnknown, Weight::Gate, quantities, text));
+    let frames = match meant {
+        Meant::Untold if unknown_mm.is_none_or(|mm| mm > correction_mm) => {
+            Some(frames_unknown(unknown_mm, correction_mm, subject))
         }
-        Meant::Nominal => {
-            let text = "base and tool are taken as nominal, as asked for: right where the real ones are".to_owned();
-            all.push(finding(Code::FramesNominal, Weight::Note, BTreeMap::new(), text));
-        }
-        _ => {}
-    }
-    all
+        Meant::Nominal => Some(frames_nominal(subject)),
+        _ => None,
+    };
+    std::iter::once(error).chain(frames).collect()
+}
+
+fn error_known(mm: &[f64], meant: &Meant, subject: &str) -> FileFinding {
+    let (rms_mm, max_mm) = (rms(mm), largest(mm));
+    let text = match meant {
+        Meant::Measured(what) => format!(
+            "the tool is expected {rms_mm:.3} mm RMS ({max_mm:.3} mm at most) from where the program meant it, joint noise included, with {what}"
+        ),
+        _ => format!(
+            "in the base frame the tool is expected {rms_mm:.2} mm RMS ({max_mm:.2} mm at most) from where the program meant it: images do not tell where base and tool stand"
+        ),
+    };
+    let quantities = numbers([("targets", mm.len() as f64), ("rms_mm", rms_mm), ("max_mm", max_mm)]);
+    FileFinding { code: Code::ExpectedError, weight: Weight::Note, subject: subject.to_owned(), quantities, text }
+}
+
+fn error_unknown(why: &str, subject: &str) -> FileFinding {
+    let text = format!(
+        "how far the tool will be from where the program meant it is not known ({why}); base and tool are usually wrong by millimetres"
+    );
+    let (code, quantities) = (Code::ExpectedErrorUnknown, BTreeMap::new());
+    FileFinding { code, weight: Weight::Note, subject: subject.to_owned(), quantities, text }
+}
+
+/// Nobody stated base and tool, and they are known worse than the correction is large.
+fn frames_unknown(unknown_mm: Option<f64>, correction_mm: f64, subject: &str) -> FileFinding {
+    let remedy =
+        "measure them with a few touches (robotcal frames) and give --frames frames.json, or say --frames nominal";
+    let size =
+        unknown_mm.map_or_else(|| "by an unknown amount".to_owned(), |mm| format!("by {mm:.2} mm RMS at the targets"));
+    let text = format!(
+        "base and tool of the real robot are unknown {size}, and the correction itself is {correction_mm:.2} mm RMS: the program repeats the shape of what was meant, and is not corrected; {remedy}"
+    );
+    let known = unknown_mm.map(|mm| ("unknown_mm", mm)).into_iter();
+    let quantities = known.chain([("correction_mm", correction_mm)]).map(|(n, v)| (n.to_owned(), v)).collect();
+    FileFinding { code: Code::FramesUnknown, weight: Weight::Gate, subject: subject.to_owned(), quantities, text }
+}
+
+fn frames_nominal(subject: &str) -> FileFinding {
+    let text = "base and tool are taken as nominal, as asked for: right where the real ones are".to_owned();
+    let (code, quantities) = (Code::FramesNominal, BTreeMap::new());
+    FileFinding { code, weight: Weight::Note, subject: subject.to_owned(), quantities, text }
 }
 
 /// All findings as JSON, one a line.

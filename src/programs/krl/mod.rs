@@ -106,44 +106,8 @@ fn reading(
     known: Places<Now>,
 ) -> Result<(Program, Places<Now>)> {
     let reader = |index: usize, file| Reader::renamed(file, index, DIALECT, |reader| scopes.names(reader));
-    let mut module = Module {
-        setting,
-        prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
-        values: BTreeMap::new(),
-        assigned: Assigned::default(),
-        uses: Uses::default(),
-        declared: Vec::new(),
-        root: FrameIs::Unset,
-        now: unset(),
-        flow: Flow::new(known).among(&routines(files)?),
-        motion_data: None,
-        path_data: None,
-        put_anywhere: PutAnywhere::default(),
-        off_zero_anywhere: OffZero::default(),
-        spline: None,
-        resumes: false,
-        copies: BTreeMap::new(),
-        begins: files.iter().filter(|file| has_moves(file)).count() == 1,
-        given: Vec::new(),
-        way: Itinerary::new(),
-    };
-    let mut references = References::default();
-    for (index, file) in files.iter().enumerate() {
-        module.assigned.look_through(reader(index, file)?, !has_moves(file));
-        off_zero::look_through(&mut module.put_anywhere, reader(index, file)?);
-        if has_moves(file) {
-            module.uses.look_through(reader(index, file)?);
-            module.resumes |= calls::resumes(reader(index, file)?);
-            calls::look_through(&mut references, reader(index, file)?);
-        }
-    }
-    // It is taken that it moves external axes of the description, where that has any.
-    let lacks_all = setting.external_axes() == 0;
-    for (index, file) in files.iter().enumerate().filter(|(_, file)| lacks_all && has_moves(file)) {
-        off_zero::goes_beside(&mut module.put_anywhere, reader(index, file)?, |name| module.assigned.sets(name));
-    }
-    module.off_zero_anywhere = module.put_anywhere.off_zero();
-    module.assigned.changed_by_calls(&references);
+    let mut module = Module::new(files, setting, known)?;
+    module.look_through(files, reader)?;
     // Data first: programs use them in whatever order the files are given.
     for wanted in [false, true] {
         for (index, file) in files.iter().enumerate().filter(|(_, f)| has_moves(f) == wanted) {
@@ -199,6 +163,59 @@ struct Module<'a> {
     /// Variables that routines in none of the files are given.
     given: Vec<Given>,
     way: Itinerary,
+}
+
+impl<'a> Module<'a> {
+    /// Before any statement.
+    fn new(files: &[TextFile], setting: &'a ProgramSetting<'a>, known: Places<Now>) -> Result<Self> {
+        Ok(Self {
+            setting,
+            prismatic: setting.chain.reading_kinds.iter().map(|k| *k == JointKind::Prismatic).collect(),
+            values: BTreeMap::new(),
+            assigned: Assigned::default(),
+            uses: Uses::default(),
+            declared: Vec::new(),
+            root: FrameIs::Unset,
+            now: unset(),
+            flow: Flow::new(known).among(&routines(files)?),
+            motion_data: None,
+            path_data: None,
+            put_anywhere: PutAnywhere::default(),
+            off_zero_anywhere: OffZero::default(),
+            spline: None,
+            resumes: false,
+            copies: BTreeMap::new(),
+            begins: files.iter().filter(|file| has_moves(file)).count() == 1,
+            given: Vec::new(),
+            way: Itinerary::new(),
+        })
+    }
+
+    /// What statements of any file do, wherever they stand.
+    fn look_through<'f>(
+        &mut self,
+        files: &'f [TextFile],
+        reader: impl Fn(usize, &'f TextFile) -> Result<Reader<'f>>,
+    ) -> Result<()> {
+        let mut references = References::default();
+        for (index, file) in files.iter().enumerate() {
+            self.assigned.look_through(reader(index, file)?, !has_moves(file));
+            off_zero::look_through(&mut self.put_anywhere, reader(index, file)?);
+            if has_moves(file) {
+                self.uses.look_through(reader(index, file)?);
+                self.resumes |= calls::resumes(reader(index, file)?);
+                calls::look_through(&mut references, reader(index, file)?);
+            }
+        }
+        // It is taken that it moves external axes of the description, where that has any.
+        let lacks_all = self.setting.external_axes() == 0;
+        for (index, file) in files.iter().enumerate().filter(|(_, file)| lacks_all && has_moves(file)) {
+            off_zero::goes_beside(&mut self.put_anywhere, reader(index, file)?, |name| self.assigned.sets(name));
+        }
+        self.off_zero_anywhere = self.put_anywhere.off_zero();
+        self.assigned.changed_by_calls(&references);
+        Ok(())
+    }
 }
 
 impl Module<'_> {

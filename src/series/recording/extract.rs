@@ -68,9 +68,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     let seems_degrees =
         (joint_unit == AngleUnit::Rad).then(|| unit::seem_degrees(recording, &postures, &joints, options)).flatten();
     let factors = unit::factors(joint_unit, &joints, options);
-    for posture in &mut postures {
-        posture.positions.iter_mut().zip(&factors).for_each(|(q, factor)| *q *= factor);
-    }
+    scale(&mut postures, &factors);
     let still_speeds: Vec<f64> = factors.iter().map(|factor| options.still_speed / factor).collect();
     let joints_place = format!("{}, topic {}", recording.display(), topics.join(", "));
     two_publishers::require_one(&joints_place, &samples, &joints, &still_speeds, or_urdf(options))?;
@@ -86,14 +84,7 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
     scan.notices.extend(late.map(|d| d.notice(recording)));
     let groups = groups(&mut scan, &postures, &times, options, (open, lateness.told.sigma_s())).map_err(|error| {
         let error = or_set_back(error, &scan.notices);
-        let never_still = error.code == Code::RobotNeverStill;
-        let others = if never_still { others_move(&error.place, &postures, &joints, options) } else { None };
-        let error = others.unwrap_or(error);
-        // Degrees are as many times too fast as radians.
-        seems_degrees
-            .as_ref()
-            .filter(|_| never_still)
-            .map_or(error, |n| Error::new(n.code, &n.place, &n.what, &n.remedy))
+        why_never_still(error, (&postures, &joints), seems_degrees.as_ref(), options)
     })?;
     let is_unit_in_doubt = seems_degrees.is_some();
     scan.notices.extend(seems_degrees);
@@ -118,6 +109,29 @@ pub fn extract(recording: &Path, images: &Path, options: &RecordingOptions) -> R
         notices,
         inputs: scan.inputs,
     })
+}
+
+fn scale(postures: &mut [Posture], factors: &[f64]) {
+    for posture in postures {
+        posture.positions.iter_mut().zip(factors).for_each(|(q, factor)| *q *= factor);
+    }
+}
+
+/// Why a robot never stands still, where that is the error and something tells.
+fn why_never_still(
+    error: Error,
+    (postures, joints): (&[Posture], &[String]),
+    seems_degrees: Option<&Notice>,
+    options: &RecordingOptions,
+) -> Error {
+    if error.code != Code::RobotNeverStill {
+        return error;
+    }
+    // Degrees are as many times too fast as radians.
+    if let Some(Notice { code, place, what, remedy }) = seems_degrees {
+        return Error::new(*code, place, what, remedy);
+    }
+    others_move(&error.place, postures, joints, options).unwrap_or(error)
 }
 
 /// Takes the pictures out of the recording: stops with their reports by their places, and what is said of images that cannot be read.
@@ -192,9 +206,8 @@ fn groups(
     let place = scan.recording.display().to_string();
     if let Motion::Accept { interval_s } = options.motion {
         if open != 0 {
-            let what =
-                format!("{}: where the robot was at an image in motion is not known", delayed(-1e-9 * open as f64));
-            return Err(Error::new(Code::ClocksApart, &place, what, OTHER_CLOCK));
+            let why = "where the robot was at an image in motion is not known";
+            return Err(clocks_apart(&place, open, &format!(": {why}")));
         }
         let moving = Moving::of(&place, (postures, &still), times, interval_s, sigma_s)?;
         let notice = moving.notice(&place, sigma_s);
@@ -207,34 +220,42 @@ fn groups(
     } else if !groups.is_empty() && standing.is_missed(used, times.len()) {
         return Err(missed(&place, used, times.len(), options));
     } else if used < times.len() && !groups.is_empty() {
-        let what = format!(
-            "{} of {} images were taken outside the standstills and are not used",
-            times.len() - used,
-            times.len()
-        );
-        scan.notices.push(Notice::new(Code::ImagesInMotion, &place, what, ""));
+        scan.notices.push(outside_standstills(&place, times.len() - used, times.len()));
     }
     if empty > 0 {
-        let what = format!("{empty} of {} standstills have no image", still.len());
-        let remedy = "wait longer at each stop, or check the stamps of the images";
-        scan.notices.push(Notice::new(Code::StandstillWithoutImage, &place, what, remedy));
+        scan.notices.push(without_image(&place, empty, still.len()));
     }
     let short = short(postures, times, options);
     if options.motion == Motion::Refuse && short > groups.len() && !groups.is_empty() {
         scan.notices.push(too_short(&place, short, options));
     }
     if groups.is_empty() && open != 0 && !still.is_empty() {
-        let what = format!(
-            "{}, and the robot stands for less at each of the {} stops: nobody knows which image is of which stop",
-            delayed(-1e-9 * open as f64),
-            still.len()
-        );
-        return Err(Error::new(Code::ClocksApart, &place, what, OTHER_CLOCK));
+        let stops = still.len();
+        let why = "nobody knows which image is of which stop";
+        let then = format!(", and the robot stands for less at each of the {stops} stops: {why}");
+        return Err(clocks_apart(&place, open, &then));
     }
     if groups.is_empty() {
         return Err(no_stop(&place, postures, [still.len(), short], options));
     }
     Ok(groups)
+}
+
+/// Images are late by so many ns, or not: what follows from that.
+fn clocks_apart(place: &str, open: i64, then: &str) -> Error {
+    let what = format!("{}{then}", delayed(-1e-9 * open as f64));
+    Error::new(Code::ClocksApart, place, what, OTHER_CLOCK)
+}
+
+fn outside_standstills(place: &str, outside: usize, images: usize) -> Notice {
+    let what = format!("{outside} of {images} images were taken outside the standstills and are not used");
+    Notice::new(Code::ImagesInMotion, place, what, "")
+}
+
+fn without_image(place: &str, empty: usize, standstills: usize) -> Notice {
+    let what = format!("{empty} of {standstills} standstills have no image");
+    let remedy = "wait longer at each stop, or check the stamps of the images";
+    Notice::new(Code::StandstillWithoutImage, place, what, remedy)
 }
 
 /// Images within standstills.

@@ -162,16 +162,7 @@ fn write_stops(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Res
     let usable: Vec<_> = is_decodable.map(|(stop, _)| stop).collect();
     let unreadable: Vec<Notice> = refused.into_iter().flatten().collect();
     if usable.is_empty() {
-        let what = match unreadable.first() {
-            Some(first) => format!("has no stop with an image that can be decoded: {first}"),
-            None => "has no stop with both an image and joint readings".to_owned(),
-        };
-        return Err(Error::new(
-            Code::StopsNotRecorded,
-            series.folder.display(),
-            what,
-            "look at joints.csv and images/",
-        ));
+        return Err(nothing_to_record(series, unreadable.first()));
     }
     if left_out > 0 {
         let what = format!("{left_out} images off the robot, or missing, are not in the recording");
@@ -197,6 +188,14 @@ fn write_stops(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Res
     }
     recording.finish()?;
     Ok(Written { stops, unreadable, notices })
+}
+
+fn nothing_to_record(series: &Series, unreadable: Option<&Notice>) -> Error {
+    let what = match unreadable {
+        Some(first) => format!("has no stop with an image that can be decoded: {first}"),
+        None => "has no stop with both an image and joint readings".to_owned(),
+    };
+    Error::new(Code::StopsNotRecorded, series.folder.display(), what, "look at joints.csv and images/")
 }
 
 /// Times of the stops, ns, at least so far apart that every one is a standstill of its own.
