@@ -166,6 +166,13 @@ impl JointNoiseLarge {
         self.quieter.is_some() && self.weight <= weight && self.of_same_stops.iter().any(|own| own == series)
     }
 
+    /// Images that stand out, in words.
+    fn odd_images(&self) -> String {
+        let predicted =
+            in_words(", images that the others predict worst:", &self.worst_predicted, |mm| format!("{mm:.1} mm"));
+        predicted + &in_words(", blurred or badly seen images:", &self.badly_seen, |px| format!("sigma {px:.3} px"))
+    }
+
     /// What robots repeat to, or the other series of this one.
     fn usual(&self) -> String {
         let unit = self.kind.units()[1];
@@ -212,21 +219,19 @@ impl Kind for JointNoiseLarge {
         if self.readings_are_poses {
             return format!(
                 "the poses of the controller are off by {:.2} {unit} ({} most) against the images from stop to stop: it computes them by its own \
-                 model of the robot, and arms are off by about a millimetre by theirs (absolute accuracy){}{}",
+                 model of the robot, and arms are off by about a millimetre by theirs (absolute accuracy){}",
                 1e3 * self.sigma,
                 self.joint,
-                in_words(", the others predict worst", &self.worst_predicted, |mm| format!("{mm:.1} mm")),
-                in_words(", blurred or badly seen", &self.badly_seen, |px| format!("sigma {px:.3} px"))
+                self.odd_images()
             );
         }
         let still = self.stands_still.as_ref().map_or_else(String::new, |still| format!(", which reads {still}"));
         format!(
-            "the joint noise is {:.2} {unit} ({} most{still}), where {}{}{}",
+            "the joint noise is {:.2} {unit} ({} most{still}), where {}{}",
             1e3 * self.sigma,
             self.joint,
             self.usual(),
-            in_words(", the others predict worst", &self.worst_predicted, |mm| format!("{mm:.1} mm")),
-            in_words(", blurred or badly seen", &self.badly_seen, |px| format!("sigma {px:.3} px"))
+            self.odd_images()
         )
     }
 

@@ -71,8 +71,9 @@ fn write_all(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
         "left out",
         r.images.iter().filter_map(|i| i.reason.as_ref().map(|why| format!("{}: {why}", i.name))),
     )?;
-    if r.statistics.observations_left_out > 0 {
-        writeln!(out, "left out  {} single observations with large residuals", r.statistics.observations_left_out)?;
+    let (left_out, used) = (r.statistics.observations_left_out, r.statistics.observations_used);
+    if left_out > 0 {
+        writeln!(out, "left out  {left_out} of {} observations, with large residuals", left_out + used)?;
     }
     limited(
         out,
@@ -270,7 +271,7 @@ fn twists(out: &mut String, r: &SolutionRecord) -> std::fmt::Result {
     let [mm, mrad] = [usual.translation_m, usual.rotation_rad].map(|size| 1e3 * size);
     writeln!(
         out,
-        "origins   of the joints are off by {:.2} mm and {:.2} mrad per axis ({factor:.2} times {mm} mm and {mrad} mrad)",
+        "origins   of the joints are off by {:.2} mm and {:.2} mrad per axis ({factor:.2} times the usual {mm} mm and {mrad} mrad)",
         factor * mm,
         factor * mrad
     )
@@ -349,7 +350,7 @@ fn scale(e: &EstimateRecord, plate: &PlateRecord) -> Option<String> {
     let all_else = e.share_of_data.filter(|s| *s > 0.0).map(|s| 100.0 * prior / s.sqrt());
     Some(match (plate.scale, all_else) {
         (None, Some(all_else)) => format!(
-            "{known} if its file is right (nobody measured it, and all else tells {all_else:.2} %); 0.1 % is 1 mm a metre: give [scale]"
+            "{known} if its file is right (nobody measured it, and all else tells it to {all_else:.2} %); 0.1 % is 1 mm a metre: give [scale]"
         ),
         _ => known,
     })
@@ -432,7 +433,7 @@ fn identifiability(out: &mut String, found: &Identifiability, who: &str, most: u
     if let Some(o) = found.observability {
         writeln!(
             out,
-            "observe   O1 {:.3}, O2 {:.2e}, O3 {:.3}, O4 {:.2e}, O5 {:.3} (over these directions, in units of the priors)",
+            "observe   O1 {:.3}, O2 {:.2e}, O3 {:.3}, O4 {:.2e}, O5 {:.3} (observability indices over these directions, in units of the priors)",
             o.o1, o.o2, o.o3, o.o4, o.o5
         )?;
     }
@@ -454,7 +455,7 @@ fn identifiability(out: &mut String, found: &Identifiability, who: &str, most: u
         most,
         out,
         "next",
-        found.next.iter().map(|a| format!("{} (takes {:.0} % off what is left)", a.words, 100.0 * a.gain)),
+        found.next.iter().map(|a| format!("{} (takes {:.0} % off what is left unknown)", a.words, 100.0 * a.gain)),
     )
 }
 

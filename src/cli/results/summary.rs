@@ -202,14 +202,15 @@ fn with_exchanged_rows(r: &SolutionRecord) -> String {
     }
 }
 
-/// A code as it is spoken of images.
+/// A code as it is spoken of images, behind their number.
 fn spoken(code: Code) -> String {
     match code {
         Code::WronglyPaired => "wrongly paired".into(),
-        Code::ImageDuplicate => "duplicates".into(),
+        Code::ImageDuplicate => "shown by others as well".into(),
+        Code::ImageSizeDiffers => "of another size".into(),
         Code::MarkersTooFew => "with too few markers".into(),
         Code::ImageContradictory => "contradicting the others".into(),
-        other => other.name().replace('_', " "),
+        other => other.name().trim_start_matches("image_").replace('_', " "),
     }
 }
 

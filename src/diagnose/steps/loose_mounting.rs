@@ -65,9 +65,9 @@ impl Kind for LooseMounting {
 
     fn remedy(&self) -> String {
         match self.mount {
-            CameraMount::Hand => "fasten it and take the series again; if it is fast, look for a joint with play",
+            CameraMount::Hand => "fasten it and take the series again; if it was firm, look for a joint with play",
             CameraMount::Fixed => {
-                "fasten the stand of the camera, and the plate on the tip, and take the series again; if both are fast, look for a joint with play"
+                "fasten the stand of the camera, and the plate on the tip, and take the series again; if both were firm, look for a joint with play"
             }
         }
         .into()
