@@ -309,26 +309,32 @@ fn correlations(
         let mut v = DVector::zeros(robot.len());
         a.into_iter().for_each(|k| v[k] = 1.0);
         b.into_iter().for_each(|k| v[k] = rho.signum());
-        let camera = |name: &str| name.starts_with("camera.");
-        let is_size = |k: usize| all[k].starts_with("plate_shape") && all[k].ends_with(".scale");
         let followed = silent.as_ref().and_then(|s| s.followed([first, second], limits.strong_correlation));
-        let remedy = match (camera(&all[first]), camera(&all[second])) {
-            (true, true) => "fill the whole image, tilt by 20 to 45 degrees, and vary the distance".to_owned(),
-            _ if [first, second].into_iter().any(is_size) => MEASURE_THE_SIZE.to_owned(),
-            _ if v.norm() > 0.0 => adviser.in_words(Some(&v)),
-            _ if followed.is_some() => format!(
-                "{} does the same to both, and only its prior tells it from them: nothing is lost by that",
-                followed.unwrap_or_default()
-            ),
-            _ if [first, second].iter().any(|&k| places_body(&all[k])) => {
-                "measure at stops with the tip turned to more different directions".to_owned()
-            }
-            _ => "roll the camera about its axis at some stops, tilt by 20 to 45 degrees, and vary the distance"
-                .to_owned(),
-        };
+        let remedy = remedy_of_pair([&all[first], &all[second]], &v, followed, adviser);
         Correlation { first: all[first].clone(), second: all[second].clone(), correlation: rho, remedy }
     };
     pairs.into_iter().map(in_words).collect()
+}
+
+/// What to do about parameters that are correlated: `direction` of the robot that holds them, `followed` by what moves both alike.
+fn remedy_of_pair(names: [&str; 2], direction: &DVector<f64>, followed: Option<&str>, adviser: &Adviser) -> String {
+    let is_size = |name: &str| name.starts_with("plate_shape") && name.ends_with(".scale");
+    match followed {
+        _ if names.iter().all(|name| name.starts_with("camera.")) => {
+            "fill the whole image, tilt by 20 to 45 degrees, and vary the distance".to_owned()
+        }
+        _ if names.into_iter().any(is_size) => MEASURE_THE_SIZE.to_owned(),
+        _ if direction.norm() > 0.0 => adviser.in_words(Some(direction)),
+        Some(followed) => {
+            format!("{followed} does the same to both, and only its prior tells it from them: nothing is lost by that")
+        }
+        None if names.into_iter().any(places_body) => {
+            "measure at stops with the tip turned to more different directions".to_owned()
+        }
+        None => {
+            "roll the camera about its axis at some stops, tilt by 20 to 45 degrees, and vary the distance".to_owned()
+        }
+    }
 }
 
 /// What to do where the size of a plate goes with a length of the robot.

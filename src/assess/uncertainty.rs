@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::used_stops::{on_robot_sigmas, shares_of_series, stops};
 use crate::assess::{
-    FlangeErrors, FlangeModel, Identifiability, Limits, NoiseAtStop, WorkspacePoint, clustered_covariance,
+    Clustered, FlangeErrors, FlangeModel, Identifiability, Limits, NoiseAtStop, WorkspacePoint, clustered_covariance,
     identifiability, urdf_alone, usual_joint_sigma,
 };
 use crate::error::Result;
@@ -74,15 +74,11 @@ pub fn judge(
     }
     found.model_sigma = sigmas(&covariance.reduced);
     if let Some(clustered) = clustered {
-        let model = FlangeModel::of(adjustment, &clustered.model, limits);
-        found.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
-        let by_clusters: Vec<f64> = found.model_sigma.iter().zip(clustered.ratios()).map(|(s, r)| s * r).collect();
-        if found.clustered_ratio.is_some_and(|ratio| ratio > limits.scatter_ratio) {
-            found.larger_stated = true;
-            enlarge(covariance, &found.model_sigma, &by_clusters, problem.layout.theta_len());
+        found.set_clustered(&clustered, adjustment, limits);
+        if let Some(by_clusters) = found.clustered_sigma.as_ref().filter(|_| found.larger_stated) {
+            enlarge(covariance, &found.model_sigma, by_clusters, problem.layout.theta_len());
             found.identifiability = identifiability(&state.robot, layout, &stops, &covariance.reduced, limits);
         }
-        found.clustered_sigma = Some(by_clusters);
     }
     let fit = &*fit;
     let in_frame = fit.in_frame()?;
@@ -105,6 +101,15 @@ pub fn judge(
 }
 
 impl Uncertainty {
+    /// What the scatter between images says of the sigmas, and whether they are to be stated by it.
+    fn set_clustered(&mut self, clustered: &Clustered, adjustment: &Adjustment, limits: &Limits) {
+        let model = FlangeModel::of(adjustment, &clustered.model, limits);
+        self.clustered_ratio = model.map(|m| m.ratio_of(&clustered.sandwich));
+        self.larger_stated = self.clustered_ratio.is_some_and(|ratio| ratio > limits.scatter_ratio);
+        let by_clusters = self.model_sigma.iter().zip(clustered.ratios()).map(|(s, r)| s * r).collect();
+        self.clustered_sigma = Some(by_clusters);
+    }
+
     /// Brings sigmas of single origins to the frames of the plates, as the stated ones are: before and after of the dense columns.
     fn take_frames_of_plates(&mut self, before: &[f64], after: &[f64]) {
         for own in std::iter::once(&mut self.model_sigma).chain(&mut self.clustered_sigma) {

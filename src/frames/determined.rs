@@ -19,48 +19,58 @@ pub(super) fn check(
     given: &Given,
     limits: &Limits,
 ) -> Result<()> {
-    let refuse = |code, what: String, remedy: &str| Err(Error::new(code, "touches", what, remedy));
     let places: Vec<Vector3<f64>> = touches.placed().map(|(_, place)| place).collect();
     let extents = extents_m(&places);
-    if extents[0] > limits.touches_apart_m {
-        let what =
-            format!("the places lie {:.0} m apart (RMS about their middle), further than any arm reaches", extents[0]);
-        return refuse(Code::TouchUnit, what, "write x_m, y_m, z_m in metres, not in mm");
-    }
-    if let Some(t) = touches.all.iter().find(|t| t.sigma_m >= limits.touch_sigma_m) {
-        let what = format!("the sigma of stop {} is {} m", t.stop, t.sigma_m);
-        return refuse(Code::TouchUnit, what, "write sigma_m in metres: 0.00005 for 0.05 mm");
-    }
+    require_metres(touches, extents[0], limits)?;
     let fewest = limits.fewest_touches;
     if columns.tool_is_free() && touches.all.len() < fewest {
         let what =
             format!("there are {}; three unknowns of the tool and the place take {fewest}", counted(touches.all.len()));
-        return refuse(Code::TouchesFew, what, "touch the same point again, with the tip turned another way");
+        return refused(Code::TouchesFew, what, "touch the same point again, with the tip turned another way");
     }
     if columns.work_is_free() {
-        let apart = count_apart(&places, limits.touches_on_a_line);
-        if apart < limits.fewest_places {
-            let what = format!(
-                "known places are {apart}, and a work object has six unknowns: it takes three that are not on a line"
-            );
-            return refuse(
-                Code::TouchesFew,
-                what,
-                "touch more points of the work object, or leave x_m, y_m, z_m empty to find the tool alone",
-            );
-        }
-        if extents[1] < limits.touches_on_a_line * extents[0] {
-            let what = format!(
-                "the {apart} known places lie on a line ({:.2} mm RMS beside it, {:.0} mm along it): the work object could turn about it",
-                1e3 * extents[1],
-                1e3 * extents[0]
-            );
-            return refuse(Code::TouchesOnLine, what, "touch a point far beside the line");
-        }
+        require_places_of_work(&places, extents, limits)?;
     }
     let relative = given.plate.is_none();
     if columns.tool_is_free() && relative {
         orientations(robot, touches, limits)?;
+    }
+    Ok(())
+}
+
+fn refused(code: Code, what: String, remedy: &str) -> Result<()> {
+    Err(Error::new(code, "touches", what, remedy))
+}
+
+fn require_metres(touches: &Touches, extent: f64, limits: &Limits) -> Result<()> {
+    if extent > limits.touches_apart_m {
+        let what = format!("the places lie {extent:.0} m apart (RMS about their middle), further than any arm reaches");
+        return refused(Code::TouchUnit, what, "write x_m, y_m, z_m in metres, not in mm");
+    }
+    if let Some(t) = touches.all.iter().find(|t| t.sigma_m >= limits.touch_sigma_m) {
+        let what = format!("the sigma of stop {} is {} m", t.stop, t.sigma_m);
+        return refused(Code::TouchUnit, what, "write sigma_m in metres: 0.00005 for 0.05 mm");
+    }
+    Ok(())
+}
+
+/// Refuses known places that are too few, or on a line: they leave a work object open.
+fn require_places_of_work(places: &[Vector3<f64>], extents: [f64; 3], limits: &Limits) -> Result<()> {
+    let apart = count_apart(places, limits.touches_on_a_line);
+    if apart < limits.fewest_places {
+        let what = format!(
+            "known places are {apart}, and a work object has six unknowns: it takes three that are not on a line"
+        );
+        let remedy = "touch more points of the work object, or leave x_m, y_m, z_m empty to find the tool alone";
+        return refused(Code::TouchesFew, what, remedy);
+    }
+    if extents[1] < limits.touches_on_a_line * extents[0] {
+        let what = format!(
+            "the {apart} known places lie on a line ({:.2} mm RMS beside it, {:.0} mm along it): the work object could turn about it",
+            1e3 * extents[1],
+            1e3 * extents[0]
+        );
+        return refused(Code::TouchesOnLine, what, "touch a point far beside the line");
     }
     Ok(())
 }

@@ -62,47 +62,10 @@ fn both(robot: &KnownRobot, touches: &Touches) -> Option<Pose> {
 /// A value of every unknown near which the adjustment converges; `None` where the touches determine none.
 pub(super) fn start(robot: &KnownRobot, touches: &Touches, columns: &Columns, given: &Given) -> Option<Unknowns> {
     let tips: Vec<Pose> = touches.postures.iter().map(|p| robot.at(p).0).collect();
-    let zero = vec![Vector3::zeros(); touches.contacts.len()];
-    let (points, work, places) = match (given.tool, given.plate) {
-        (Some(tool), plate) => {
-            let points = vec![tool.translation; touches.bodies.len()];
-            let work = match plate {
-                Some(plate) => plate,
-                None if columns.work_is_free() => work_of(&tips, touches, &points)?,
-                None => Pose::identity(),
-            };
-            (points, work, zero)
-        }
-        (None, Some(plate)) => {
-            let [points, places] = linear(&tips, touches, Some(&plate))?;
-            (points, plate, places)
-        }
-        (None, None) if !columns.work_is_free() => {
-            let [points, places] = linear(&tips, touches, None)?;
-            (points, Pose::identity(), places)
-        }
-        (None, None) => {
-            // Places that are not known tell the tool; known ones tell both.
-            let work = match linear(&tips, touches, None) {
-                Some([points, _]) => work_of(&tips, touches, &points)?,
-                None => both(robot, touches)?,
-            };
-            let [points, places] = linear(&tips, touches, Some(&work))?;
-            (points, work, places)
-        }
-    };
-    let rotation = |body: usize| {
-        let turned = touches.all.iter().filter_map(|t| match t.seen {
-            TouchPlace::Pose(pose) if t.body == body => {
-                Some(tips[t.posture].rotation.transpose() * work.rotation * pose.rotation)
-            }
-            _ => None,
-        });
-        let sum = turned.fold(Matrix3::zeros(), |sum, r| sum + r);
-        project_to_so3(&sum).filter(|_| touches.is_pose(body))
-    };
+    let (points, work, places) = located(robot, &tips, touches, columns, given)?;
     let of_given = given.tool.map_or_else(Matrix3::identity, |t| t.rotation);
-    let tools = points.iter().enumerate().map(|(b, p)| Pose::new(rotation(b).unwrap_or(of_given), *p)).collect();
+    let rotation = |body: usize| rotation_seen(&tips, touches, &work, body).unwrap_or(of_given);
+    let tools = points.iter().enumerate().map(|(b, p)| Pose::new(rotation(b), *p)).collect();
     // Places are in the work object.
     let mut places: Vec<Vector3<f64>> = places.iter().map(|p| work.inverse().transform(p)).collect();
     if given.tool.is_some() {
@@ -112,4 +75,55 @@ pub(super) fn start(robot: &KnownRobot, touches: &Touches, columns: &Columns, gi
         }
     }
     Some(Unknowns { tools, work, places })
+}
+
+/// Points of the bodies in the tip, the work object, and the places that are not known, in the base.
+fn located(
+    robot: &KnownRobot,
+    tips: &[Pose],
+    touches: &Touches,
+    columns: &Columns,
+    given: &Given,
+) -> Option<(Vec<Vector3<f64>>, Pose, Vec<Vector3<f64>>)> {
+    let zero = vec![Vector3::zeros(); touches.contacts.len()];
+    Some(match (given.tool, given.plate) {
+        (Some(tool), plate) => {
+            let points = vec![tool.translation; touches.bodies.len()];
+            let work = match plate {
+                Some(plate) => plate,
+                None if columns.work_is_free() => work_of(tips, touches, &points)?,
+                None => Pose::identity(),
+            };
+            (points, work, zero)
+        }
+        (None, Some(plate)) => {
+            let [points, places] = linear(tips, touches, Some(&plate))?;
+            (points, plate, places)
+        }
+        (None, None) if !columns.work_is_free() => {
+            let [points, places] = linear(tips, touches, None)?;
+            (points, Pose::identity(), places)
+        }
+        (None, None) => {
+            // Places that are not known tell the tool; known ones tell both.
+            let work = match linear(tips, touches, None) {
+                Some([points, _]) => work_of(tips, touches, &points)?,
+                None => both(robot, touches)?,
+            };
+            let [points, places] = linear(tips, touches, Some(&work))?;
+            (points, work, places)
+        }
+    })
+}
+
+/// How a body is turned in the tip, by the touches that see it as a pose; none where none does.
+fn rotation_seen(tips: &[Pose], touches: &Touches, work: &Pose, body: usize) -> Option<Matrix3<f64>> {
+    let turned = touches.all.iter().filter_map(|t| match t.seen {
+        TouchPlace::Pose(pose) if t.body == body => {
+            Some(tips[t.posture].rotation.transpose() * work.rotation * pose.rotation)
+        }
+        _ => None,
+    });
+    let sum = turned.fold(Matrix3::zeros(), |sum, r| sum + r);
+    project_to_so3(&sum).filter(|_| touches.is_pose(body))
 }

@@ -15,7 +15,7 @@ use crate::error::{Code, Error, Notice, Result};
 use crate::identify::controller::readings::{self, is_unreached, other_postures, readings_of, readings_told};
 use crate::identify::controller::told::told;
 use crate::problem::{ImageRejection, MeasuredSeries, MeasuredStop, Shared};
-use crate::series::{CirclePoint, Observation, Plate, Series, Source, StopOrder};
+use crate::series::{CirclePoint, ImageObservations, Observation, Plate, Series, Source, StopOrder};
 use crate::urdf::Chain;
 
 /// A seen series with what the user should know of it.
@@ -74,19 +74,7 @@ fn seen_at(
     let mut plate = series.plate.clone();
     let (mut seen, found_size) = match &series.source {
         Source::Images { .. } => look_through(series, (limits, progress), &mut notices, &mut plate)?,
-        Source::Observations(all) => {
-            let by_name: BTreeMap<&str, &Vec<Observation>> =
-                all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
-            let given = |image: &str| match by_name.get(image) {
-                Some(o) => StopObservations { observations: (*o).clone().into(), left_out: None, remedy: None },
-                None => StopObservations {
-                    observations: Shared::default(),
-                    left_out: Some(ImageRejection::NoObservations),
-                    remedy: None,
-                },
-            };
-            (series.stops.stops.iter().map(|s| given(&s.image)).collect(), None)
-        }
+        Source::Observations(all) => (observed(series, all), None),
         Source::Recording(path) => return Err(recording(path)),
         Source::NoImages => return Err(no_images(series)),
         Source::Cameras(_) => return Err(several_cameras(series)),
@@ -114,6 +102,20 @@ fn seen_at(
     let measured = measured_series(series, lens, size_px, centroid, stops);
     let postures = other_postures(series, chain, (&measured.stops, &bodies));
     Ok(MeasuredWithNotices { series: MeasuredSeries { plate, bodies, lengths, postures, ..measured }, notices })
+}
+
+/// The observations of every stop, of a series that has them instead of images.
+fn observed(series: &Series, all: &[ImageObservations]) -> Vec<StopObservations> {
+    let by_name: BTreeMap<&str, &Vec<Observation>> = all.iter().map(|i| (i.image.as_str(), &i.observations)).collect();
+    let given = |image: &str| match by_name.get(image) {
+        Some(o) => StopObservations { observations: (*o).clone().into(), left_out: None, remedy: None },
+        None => StopObservations {
+            observations: Shared::default(),
+            left_out: Some(ImageRejection::NoObservations),
+            remedy: None,
+        },
+    };
+    series.stops.stops.iter().map(|s| given(&s.image)).collect()
 }
 
 /// Width and height of the images of one camera: those of its images, else as stated, px.
