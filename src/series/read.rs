@@ -340,13 +340,7 @@ fn pictured(
         (None, Some(there)) => format!("\"{there}\" is there, and its format is not read: {CONVERT}"),
         (None, None) => "copy the image or remove the row".to_string(),
     };
-    let unread = |(stop, _): &(&SeriesStop, &u64)| others.contains(&stop.image);
-    let of_unread: Vec<(&SeriesStop, &u64)> = stops.stops.iter().zip(lines).filter(unread).collect();
-    if let Some((stop, line)) = of_unread.first().filter(|_| 2 * of_unread.len() > stops.stops.len()) {
-        let (count, all) = (of_unread.len(), stops.stops.len());
-        let what = format!("image \"{}\" is of a format that is not read ({count} of {all} images)", stop.image);
-        return Err(Error::new(Code::ImageUnreadable, format!("{}:{line}", csv.display()), what, CONVERT));
-    }
+    refuse_other_formats((csv, lines), stops, &others)?;
     // Some images lost among many are left out by name; most images lost is a wrong folder or wrong names.
     if let Some((line, name)) = missing.first().filter(|_| 2 * missing.len() > stops.stops.len()) {
         let what = format!(
@@ -367,6 +361,18 @@ fn pictured(
     notices.extend((!unnamed.is_empty()).then(|| unlisted(images, csv, &unnamed)));
     let Light { dark, white } = light;
     Ok(Source::Images { folder: images.to_path_buf(), dark, white })
+}
+
+/// Refuses a series most of whose images are of formats that are not read: `others` names these files.
+fn refuse_other_formats((csv, lines): (&Path, &[u64]), stops: &Stops, others: &BTreeSet<String>) -> Result<()> {
+    let unread = |(stop, _): &(&SeriesStop, &u64)| others.contains(&stop.image);
+    let of_unread: Vec<(&SeriesStop, &u64)> = stops.stops.iter().zip(lines).filter(unread).collect();
+    let Some((stop, line)) = of_unread.first().filter(|_| 2 * of_unread.len() > stops.stops.len()) else {
+        return Ok(());
+    };
+    let (count, all) = (of_unread.len(), stops.stops.len());
+    let what = format!("image \"{}\" is of a format that is not read ({count} of {all} images)", stop.image);
+    Err(Error::new(Code::ImageUnreadable, format!("{}:{line}", csv.display()), what, CONVERT))
 }
 
 /// The file in a folder below that of the images.

@@ -19,7 +19,7 @@ use crate::output::poses_record::{usual, worst};
 use crate::output::stand_alone_files::{self, StandAloneContext, stand_alone_files};
 use crate::output::{REPORT, ResultFolder, folder_name};
 use crate::problem::{Adjustment, MeasuredSeries};
-use crate::series::{InputFile, Series, Source, read_without_robot, series_of_images};
+use crate::series::{Series, Source, read_without_robot, series_of_images};
 use crate::urdf::Chain;
 
 /// Images of which the table has a row each; of more, the worst.
@@ -64,14 +64,10 @@ pub fn run(args: &PosesArgs) -> Result<Verdict> {
         None => claim(&Path::new("reports").join(format!("{}-poses", folder_name(&names))))?,
     };
     let series = pictures.of_recordings(series, &args.recording.options(&[])?)?;
-    let (mut inputs, mut notices): (Vec<InputFile>, Vec<Notice>) = Default::default();
     let hashes = series.iter().map(Series::image_hashes).collect::<Result<Vec<_>>>()?;
-    for (s, hashes) in series.iter().zip(&hashes) {
-        inputs.extend(s.inputs.iter().chain(hashes).cloned());
-        if let Source::Cameras(_) = &s.source {
-            notices.extend(s.notices.iter().cloned());
-        }
-    }
+    let inputs = series.iter().zip(&hashes).flat_map(|(s, hashes)| s.inputs.iter().chain(hashes)).cloned().collect();
+    let of_several = series.iter().filter(|s| matches!(s.source, Source::Cameras(_)));
+    let mut notices: Vec<Notice> = of_several.flat_map(|s| s.notices.iter().cloned()).collect();
     let views: Vec<Series> = series.iter().flat_map(Series::views).cloned().map(without_joints).collect();
     let limits = Limits::default();
     let (mut measured, seen) = observe(&views, &limits)?;
@@ -94,14 +90,18 @@ pub fn run(args: &PosesArgs) -> Result<Verdict> {
     if let Some((path, (_, compared))) = args.against.as_deref().zip(context.against.as_ref()) {
         say!("{}", against::text(path, compared));
     }
-    for finding in &found.findings {
-        let word = if finding.fails() { "GATE" } else { "note" };
-        say_line!("{word:9} {finding}");
-    }
-    context.notices.iter().for_each(|n| say_line!("note      {}", n.coded()));
+    say_findings(&found.findings, &context.notices);
     say_line!("report    {}", folder.join(REPORT).display());
     say_line!("results   {} ({} files)", folder.display(), files.len());
     Ok(if found.findings.iter().any(Finding::fails) { Verdict::GateFailed } else { Verdict::Good })
+}
+
+fn say_findings(findings: &[Finding], notices: &[Notice]) {
+    for finding in findings {
+        let word = if finding.fails() { "GATE" } else { "note" };
+        say_line!("{word:9} {finding}");
+    }
+    notices.iter().for_each(|n| say_line!("note      {}", n.coded()));
 }
 
 /// No robot takes part.
