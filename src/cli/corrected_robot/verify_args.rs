@@ -29,7 +29,7 @@ pub struct VerifyArgs {
     /// Sigma per axis of what measured those points, m: it is no error of the model
     #[arg(long, value_name = "METRES", requires = "points")]
     pub(super) point_sigma_m: Option<f64>,
-    /// Another series of the robot, in mm and px; several are judged together
+    /// Another series of the robot: by how much the model misses it, in mm and px; several are judged together
     #[arg(long, value_name = "FOLDER", num_args = 1.., conflicts_with = "points")]
     pub(super) series: Vec<PathBuf>,
     /// Base link

@@ -32,7 +32,7 @@ pub struct ChoiceArgs {
     /// Hold these parameters at nominal (camera.front.k3, joint_2)
     #[arg(long, value_name = "NAME")]
     fix: Vec<String>,
-    /// File with parameters, robot_model, free, fix, [prior] and [limits] (see the guide); flags win, free and fix are added to
+    /// File with parameters, robot_model, harmonics, free, fix, [prior], [payload] and [limits] (see the guide); flags win, free and fix are added to
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
