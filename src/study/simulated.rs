@@ -1,6 +1,6 @@
 //! A simulated series as if it had been measured.
 
-use crate::problem::{LensChoice, MeasuredSeries, MeasuredStop};
+use crate::problem::{MeasuredSeries, MeasuredStop};
 use crate::series::{AngleUnit, StopOrder};
 use crate::simulate::SimulatedSeries;
 use crate::urdf::{Chain, JointKind};
@@ -25,26 +25,15 @@ pub fn measured(series: &SimulatedSeries, chain: &Chain) -> MeasuredSeries {
         .collect();
     let camera = &series.truth.camera;
     MeasuredSeries {
-        name: "simulated".into(),
-        run: None,
         camera: "camera".into(),
         mounting: "mounting".into(),
         mount: series.manifest.mount(),
         width_px: camera.width_px,
         height_px: camera.height_px,
-        focal_px: None,
-        known_camera: None,
         lens: camera.lens,
-        lens_choice: LensChoice::Settled,
-        centroid: true,
         plate: series.plate.clone(),
         plate_name: "plate".into(),
         has_images: true,
-        bodies: Vec::new(),
-        lengths: Vec::new(),
-        order_known: series.manifest.robot.order == StopOrder::Visited,
-        postures: Vec::new(),
-        otherwise: Vec::new(),
-        stops,
+        ..MeasuredSeries::without_images("simulated", series.manifest.robot.order == StopOrder::Visited, stops)
     }
 }

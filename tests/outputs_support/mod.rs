@@ -170,26 +170,14 @@ fn series_where(
     }
     MeasuredSeries {
         has_images: true,
-        bodies: Vec::new(),
-        lengths: Vec::new(),
-        name: "run1".into(),
-        run: None,
         camera: "front".into(),
         mounting: "run1".into(),
         mount,
         width_px: 1280,
         height_px: 1024,
-        focal_px: None,
-        known_camera: None,
-        lens: Lens::Brown,
-        lens_choice: robotcal::problem::LensChoice::Settled,
-        centroid: true,
         plate,
         plate_name: "/somewhere/run1/plate.toml".into(),
-        order_known: true,
-        postures: Vec::new(),
-        otherwise: Vec::new(),
-        stops,
+        ..MeasuredSeries::without_images("run1", true, stops)
     }
 }
 

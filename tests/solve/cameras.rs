@@ -7,7 +7,7 @@ use robotcal::identify::{JointNoise, Options, Selection, Solution, identify};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::Robot;
 use robotcal::output::{self, restore, solution_json};
-use robotcal::problem::{BodySeen, InstrumentKind, LensChoice, MeasuredSeries, MeasuredStop, PlateShape, SeenBody};
+use robotcal::problem::{BodySeen, InstrumentKind, MeasuredSeries, MeasuredStop, PlateShape, SeenBody};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 
 use crate::outputs_support::{context, robot, scene};
@@ -139,27 +139,16 @@ pub fn seen_at(
         }
     }
     let series = |(k, stops): (usize, Vec<MeasuredStop>)| MeasuredSeries {
-        name: format!("run cam{k}"),
         run: Some("run".into()),
         camera: format!("cam{k}"),
         mounting: format!("run cam{k}"),
         mount: mounts[k],
         width_px: 1280,
         height_px: 1024,
-        focal_px: None,
-        known_camera: None,
-        lens: Lens::Brown,
-        lens_choice: LensChoice::Settled,
-        centroid: true,
         plate: plate.clone(),
         plate_name: format!("plate {:?}", mounts[k]),
-        order_known: true,
-        postures: Vec::new(),
-        otherwise: Vec::new(),
         has_images: true,
-        bodies: Vec::new(),
-        lengths: Vec::new(),
-        stops,
+        ..MeasuredSeries::without_images(&format!("run cam{k}"), true, stops)
     };
     Seen { series: stops.into_iter().enumerate().map(series).collect(), joint_errors }
 }

@@ -10,7 +10,7 @@ use robotcal::geom::Pose;
 use robotcal::identify::{Options, Solution, identify};
 use robotcal::model::camera::{Camera, Lens};
 use robotcal::model::robot::Robot;
-use robotcal::problem::{LensChoice, MeasuredSeries, MeasuredStop};
+use robotcal::problem::{MeasuredSeries, MeasuredStop};
 use robotcal::series::{CameraMount, Edge, Observation, Plate, PlateKind};
 use robotcal::urdf::{Chain, FoundOrigin, RobotDescription};
 
@@ -105,27 +105,16 @@ fn world_with(seed: u64, images: usize, reversed: Option<usize>) -> World {
         });
     }
     let series = MeasuredSeries {
-        name: "hobby".into(),
-        run: None,
         camera: "webcam".into(),
         mounting: "hand".into(),
         mount: CameraMount::Hand,
         width_px: 1280,
         height_px: 720,
-        focal_px: None,
-        known_camera: None,
-        lens: Lens::Brown,
-        lens_choice: LensChoice::Settled,
         centroid: false,
         plate,
         plate_name: "plate".into(),
-        order_known: true,
-        postures: Vec::new(),
-        otherwise: Vec::new(),
         has_images: true,
-        bodies: Vec::new(),
-        lengths: Vec::new(),
-        stops,
+        ..MeasuredSeries::without_images("hobby", true, stops)
     };
     World { nominal, truth, camera_pose, plate_pose, reversed, offsets, series, held_out }
 }

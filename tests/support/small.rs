@@ -367,28 +367,17 @@ pub fn series(problem: &Problem) -> MeasuredSeries {
             .collect(),
         left_out: None,
     };
+    let stops = problem.images.iter().enumerate().map(stop).collect();
     MeasuredSeries {
-        name: "small".into(),
-        run: None,
         camera: problem.cameras[0].clone(),
         mounting: problem.mountings[0].clone(),
         mount: problem.images[0].mount,
         width_px: WIDTH_PX,
         height_px: HEIGHT_PX,
-        focal_px: None,
-        known_camera: None,
-        lens: Lens::Brown,
-        lens_choice: robotcal::problem::LensChoice::Settled,
-        centroid: true,
         plate_name: "plate".into(),
-        order_known: false,
-        postures: Vec::new(),
-        otherwise: Vec::new(),
         has_images: true,
-        bodies: Vec::new(),
-        lengths: Vec::new(),
-        stops: problem.images.iter().enumerate().map(stop).collect(),
         plate,
+        ..MeasuredSeries::without_images("small", false, stops)
     }
 }
 
