@@ -2,6 +2,7 @@
 
 use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
+use super::left_out::reading_circles::ReadingCircles;
 use super::left_out::{
     exchanged_pictures, exchanged_readings, left_out_bodies, left_out_images, left_out_observations, many_left_out,
     moved, shifted_measurements, shifted_readings,
@@ -25,6 +26,8 @@ pub enum Stage {
     FreePoses(fn(&Problem, &CheckContext) -> Vec<Finding>),
     /// After wrong pairs and outliers were left out.
     LeftOut(fn(&Adjustment, &CheckContext) -> Vec<Finding>),
+    /// Then, with the readings that wrongly paired images fit.
+    WrongPairs(fn(&Adjustment, &ReadingCircles, &CheckContext) -> Vec<Finding>),
     /// After the fit, with the accuracy on images that it had not seen.
     Fit(fn(&Fit, &Accuracy, &CheckContext) -> Vec<Finding>),
     /// After it is known how far the result can be trusted.
@@ -163,13 +166,13 @@ pub const CHECKS: &[Check] = &[
         },
         ..check("exchanged_pictures", Stage::LeftOut(|a, s| found(exchanged_pictures::check(a, s))))
     },
-    check("exchanged_readings", Stage::LeftOut(|a, s| found(exchanged_readings::check(a, s)))),
+    check("exchanged_readings", Stage::WrongPairs(|a, r, s| found(exchanged_readings::check(a, r, s)))),
     Check {
         explains: |_, other| matches!(other, Finding::ManyLeftOut(_)),
         ..check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s))))
     },
     check("shifted_measurements", Stage::LeftOut(|a, s| found(shifted_measurements::check(a, s)))),
-    check("shifted_readings", Stage::LeftOut(|a, s| found(shifted_readings::check(a, s)))),
+    check("shifted_readings", Stage::WrongPairs(|a, r, s| found(shifted_readings::check(a, r, s)))),
     check("repeated_measurements", Stage::LeftOut(|a, s| found(repeated_measurements::check(a, s)))),
     check("left_out_bodies", Stage::LeftOut(|a, s| found(left_out_bodies::check(a, s)))),
     check("measurement_scatter", Stage::Fit(|a, b, s| found(measurement_scatter::check(a, b, s)))),
@@ -269,8 +272,10 @@ impl<'a> Diagnosis<'a> {
     pub fn of_left_out(setting: CheckContext<'a>, adjustment: &Adjustment) -> Result<Self> {
         let mut own = Self::new(setting);
         own.after_free_poses(&adjustment.problem);
+        let circles = ReadingCircles::of(&adjustment.problem);
         own.run(|stage, setting| match stage {
             Stage::LeftOut(check) => Some(check(adjustment, setting)),
+            Stage::WrongPairs(check) => Some(check(adjustment, &circles, setting)),
             _ => None,
         });
         own.refusal().map_or(Ok(own), Err)
@@ -314,8 +319,8 @@ mod tests {
 
     use super::*;
     use crate::diagnose::{
-        Carried, ContradictedLengths, Displaced, Displacement, DoubtedSize, InOrder, JointNoiseLarge, LooseMounting,
-        PlateSays, ToldBy,
+        Carried, ContradictedLengths, Displaced, Displacement, DoubtedSize, HeldContradicted, InOrder, JointNoiseLarge,
+        LooseMounting, PlateSays, ToldBy,
     };
     use crate::series::CameraMount;
     use crate::urdf::JointKind;
@@ -417,19 +422,35 @@ mod tests {
         assert_eq!(names.len(), CHECKS.len());
     }
 
+    fn loose(mounting: &str) -> Finding {
+        Finding::from(LooseMounting {
+            mounting: mounting.to_owned(),
+            mount: CameraMount::Hand,
+            turn: "yaw",
+            angle_rad: 0.01,
+            spread_rad: 0.001,
+            images: Vec::new(),
+            of: 20,
+        })
+    }
+
+    /// The flange is hardly off by what is held, and the camera has two places by it alone.
+    #[test]
+    fn a_note_explains_the_gate_of_which_it_leaves_nothing() {
+        let held = Finding::from(HeldContradicted {
+            parameters: vec!["joint_2.offset".to_owned()],
+            deviate: 9.0,
+            moved_m: Some([1e-5, 1e-4]),
+            steadied: vec!["hand".to_owned()],
+            weight: Weight::Note,
+        });
+        assert!(held.weight() < loose("hand").weight());
+        assert!(is_explained(&loose("hand"), &held));
+        assert!(!is_explained(&loose("other"), &held));
+    }
+
     #[test]
     fn a_camera_of_another_series_is_loose_whatever_the_poses_of_one_are() {
-        let loose = |mounting: &str| {
-            Finding::from(LooseMounting {
-                mounting: mounting.to_owned(),
-                mount: CameraMount::Hand,
-                turn: "yaw",
-                angle_rad: 0.01,
-                spread_rad: 0.001,
-                images: Vec::new(),
-                of: 20,
-            })
-        };
         assert!(follows_from_tool(&loose("of_poses"), &["of_poses"]));
         assert!(!follows_from_tool(&loose("of_joints"), &["of_poses"]));
     }

@@ -1,6 +1,6 @@
 //! Do images that were left out one after the other fit the readings of their neighbours?
 
-use super::exchanged_readings::ReadingCircles;
+use super::reading_circles::ReadingCircles;
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::problem::Adjustment;
@@ -21,15 +21,14 @@ pub struct ShiftedReadings {
 }
 
 /// Every run once; of several cameras at the same stops that of the first.
-pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ShiftedReadings> {
+pub fn check(adjustment: &Adjustment, circles: &ReadingCircles, setting: &CheckContext) -> Vec<ShiftedReadings> {
     let problem = &adjustment.problem;
-    let circles = ReadingCircles::of(problem);
     let mut found: Vec<(Vec<usize>, ShiftedReadings)> = Vec::new();
     for camera in 0..problem.cameras.len() {
         let of_camera: Vec<usize> = (0..problem.images.len()).filter(|&i| problem.images[i].camera == camera).collect();
         for below in [true, false] {
             let all: Vec<Option<f64>> =
-                (0..of_camera.len()).map(|k| fits_neighbour(&circles, &of_camera, k, below)).collect();
+                (0..of_camera.len()).map(|k| fits_neighbour(circles, &of_camera, k, below)).collect();
             let places: Vec<usize> = (0..all.len()).collect();
             let runs = places.chunk_by(|a, b| all[*a].is_some() && all[*b].is_some());
             for run in runs.filter(|run| run.len() >= setting.limits.moved_images) {
