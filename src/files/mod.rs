@@ -111,6 +111,15 @@ pub fn read_text(path: &Path, kind: FileKind) -> Result<String> {
     text(path, read(path, kind)?)
 }
 
+/// The encoding of bytes that are UTF-16 text, with a byte order mark or with every other byte zero.
+pub fn utf16(bytes: &[u8]) -> Option<&'static str> {
+    match bytes {
+        [0xff, 0xfe, ..] | [1..=255, 0, 1..=255, 0, ..] => Some("UTF-16LE"),
+        [0xfe, 0xff, ..] | [0, 1..=255, 0, 1..=255, ..] => Some("UTF-16BE"),
+        _ => None,
+    }
+}
+
 /// Bytes as text without its byte order mark; `origin` is for messages only.
 ///
 /// # Errors
@@ -121,7 +130,7 @@ pub fn text(origin: &Path, bytes: Vec<u8>) -> Result<String> {
         true => "save it as UTF-8 (in a spreadsheet: CSV UTF-8)",
         false => "save it as UTF-8 (in an editor: encoding UTF-8)",
     };
-    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+    if utf16(&bytes).is_some() {
         return Err(Error::new(Code::TextEncoding, origin.display(), "is UTF-16 text", remedy));
     }
     let mut text = String::from_utf8(bytes).map_err(|e| {

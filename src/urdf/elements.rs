@@ -38,6 +38,8 @@ pub(super) struct JointElement {
     /// Unit axis; zero where the joint does not move along or about one.
     pub axis: Vector3<f64>,
     pub limits: Option<(f64, f64)>,
+    /// URDF demands limits of it, and none are stated.
+    pub is_unlimited: bool,
     pub mimic: Option<MimicElement>,
     /// `file:line` of the element.
     pub place: String,
@@ -90,8 +92,12 @@ impl Source<'_> {
         match node.attribute("type") {
             Some(kind) if TYPES.contains(&kind) => {}
             kind => {
-                let what = format!("joint type {kind:?} is none of {}", TYPES.join(", "));
-                return Err(self.refuse(Code::UrdfElement, node, name, what, "correct the type attribute"));
+                let there = kind.map_or_else(|| "no joint type".to_owned(), |kind| format!("joint type \"{kind}\""));
+                let what = format!("{there}: there are {}", TYPES.join(", "));
+                let meant = kind.and_then(|kind| closest_name(kind, TYPES));
+                let remedy =
+                    meant.map_or_else(|| "state one of them".to_owned(), |meant| format!("write type=\"{meant}\""));
+                return Err(self.refuse(Code::UrdfElement, node, name, what, &remedy));
             }
         }
         self.check_children(node, name)?;
@@ -208,6 +214,7 @@ impl Source<'_> {
         Ok(JointElement {
             axis: self.axis(node, read, notices)?,
             limits: limits(node, read, &at, notices),
+            is_unlimited: needs_limits(read) && read.mimic.is_none() && stated_limit(node).is_none(),
             mimic: read.mimic.as_ref().map(|m| MimicElement {
                 joint: m.joint.clone(),
                 multiplier: m.multiplier.unwrap_or(1.0),
@@ -261,6 +268,16 @@ fn is_misspelt_mimic(tag: &str, key: &str) -> bool {
     tag == "mimic" && key != "joint" && closest_name(key, ["multiplier", "offset"]).is_some()
 }
 
+/// Whether URDF demands limits of a joint.
+fn needs_limits(read: &urdf_rs::Joint) -> bool {
+    matches!(read.joint_type, JointType::Revolute | JointType::Prismatic)
+}
+
+/// The `<limit>` of a joint that limits its range.
+fn stated_limit<'a, 'i>(joint: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
+    child(joint, "limit").filter(|element| element.has_attribute("lower") || element.has_attribute("upper"))
+}
+
 /// Limits where they mean something: not for continuous joints, not the pair 0, 0 that defaults and CAD exports leave.
 fn limits(
     node: Node<'_, '_>,
@@ -268,14 +285,7 @@ fn limits(
     place: &impl Fn() -> String,
     notices: &mut Vec<Notice>,
 ) -> Option<(f64, f64)> {
-    if !matches!(read.joint_type, JointType::Revolute | JointType::Prismatic) {
-        return None;
-    }
-    let states = |element: &Node<'_, '_>| element.has_attribute("lower") || element.has_attribute("upper");
-    let Some(element) = child(node, "limit").filter(states) else {
-        notices.extend(read.mimic.is_none().then(|| unlimited(read, place())));
-        return None;
-    };
+    let element = stated_limit(node).filter(|_| needs_limits(read))?;
     let bound = |key: &str| element.attribute(key).and_then(|v| numbers(v, 1)).map_or(0.0, |v| v[0]);
     let (lower, upper) = (bound("lower"), bound("upper"));
     if lower < upper {
@@ -291,19 +301,6 @@ fn limits(
     let what = format!("its limits, lower {lower} and upper {upper}, leave no room to move and are not used");
     notices.push(Notice::new(Code::UrdfLimits, place(), what, "correct the <limit>"));
     None
-}
-
-/// What counts as the range of a joint that states none.
-fn unlimited(read: &urdf_rs::Joint, place: String) -> Notice {
-    let range = match read.joint_type {
-        JointType::Prismatic => format!("{UNLIMITED_M} m ({SEARCHED_M} m where a posture is looked for)"),
-        _ => "half a turn".to_owned(),
-    };
-    let what = format!(
-        "states no limits, which URDF demands of it: where its range counts, {range} to both sides of zero is taken"
-    );
-    let remedy = "write <limit lower=\"...\" upper=\"...\"/>, or type=\"continuous\" where it turns without end";
-    Notice::new(Code::UrdfUnlimited, place, what, remedy)
 }
 
 /// First child element of that name.

@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Node, ParsingOptions};
+use urdf_rs::JointType;
 
-use super::elements::{JointElement, Source};
+use super::elements::{JointElement, SEARCHED_M, Source, UNLIMITED_M};
 use super::inertial::{Inertial, inertial};
 use super::skeleton::skeleton;
 use crate::error::{Code, Error, Notice, Result, closest_name, plain_name};
@@ -40,14 +41,13 @@ pub struct RobotDescription {
 pub fn read(path: &Path) -> Result<RobotDescription> {
     let bytes = files::read(path, FileKind::Robot)?;
     refuse_no_text(path, &bytes)?;
+    if let Some(encoding) = files::utf16(&bytes) {
+        let remedy = format!("convert it: iconv -f {encoding} -t UTF-8 in.urdf > out.urdf");
+        return Err(Error::new(Code::TextEncoding, path.display(), "is UTF-16 text, not UTF-8", remedy));
+    }
     let text = String::from_utf8(bytes).map_err(|e| {
         let what = format!("is not UTF-8 text (byte {})", e.utf8_error().valid_up_to());
-        Error::new(
-            Code::TextEncoding,
-            path.display(),
-            what,
-            "convert it: iconv -f LATIN1 -t UTF-8 in.urdf > out.urdf (-f UTF-16 where it is that)",
-        )
+        Error::new(Code::TextEncoding, path.display(), what, "convert it: iconv -f LATIN1 -t UTF-8 in.urdf > out.urdf")
     })?;
     RobotDescription::from_text(path, text)
 }
@@ -132,9 +132,30 @@ impl RobotDescription {
             text: String::new(),
         };
         description.check_tree()?;
-        let placeholder = description.placeholder_notice();
-        description.notices.extend(placeholder);
+        let of_all = [description.unlimited_notice(), description.placeholder_notice()];
+        description.notices.extend(of_all.into_iter().flatten());
         Ok(Self { text, ..description })
+    }
+
+    /// Joints without limits, and what counts as their range.
+    fn unlimited_notice(&self) -> Option<Notice> {
+        let unlimited: Vec<&JointElement> = self.joints.iter().filter(|joint| joint.is_unlimited).collect();
+        let first = unlimited.first()?;
+        let names: Vec<&str> = unlimited.iter().map(|joint| joint.name.as_str()).collect();
+        let ranges = [
+            (JointType::Revolute, "half a turn".to_owned()),
+            (JointType::Prismatic, format!("{UNLIMITED_M} m ({SEARCHED_M} m where a posture is looked for)")),
+        ];
+        let there = ranges.into_iter().filter(|(kind, _)| unlimited.iter().any(|joint| joint.joint_type == *kind));
+        let ranges: Vec<String> = there.map(|(_, range)| range).collect();
+        let what = format!(
+            "no limits of {}, which URDF demands: where their range counts, {} to both sides of zero is taken; urdfdom and pinocchio may refuse the \
+             file, and the corrected one with it",
+            names.join(", "),
+            ranges.join(" or ")
+        );
+        let remedy = "write <limit lower=\"...\" upper=\"...\" effort=\"...\" velocity=\"...\"/>, or type=\"continuous\" where a joint turns without end";
+        Some(Notice::new(Code::UrdfUnlimited, &first.place, what, remedy))
     }
 
     fn placeholder_notice(&self) -> Option<Notice> {
@@ -236,6 +257,10 @@ pub(super) fn parse<'a>(path: &Path, text: &'a str) -> Result<Document<'a>> {
             roxmltree::Error::UnknownNamespace(prefix, at) if prefix == "xacro" => return xacro(path, at.row),
             roxmltree::Error::DtdDetected => {
                 (line(), "declares entities (<!ENTITY ..>)".into(), "write what they stand for in their place")
+            }
+            roxmltree::Error::UnexpectedEndOfStream | roxmltree::Error::UnclosedRootNode => {
+                let what = "ends here with elements that are not closed, as a file that was cut off";
+                (text.lines().count().max(1) as u32, what.into(), "give the whole file, down to </robot>")
             }
             _ => (error.pos().row, format!("is not well-formed XML: {error}"), "correct the XML there"),
         };

@@ -213,16 +213,37 @@ fn bad_trees_and_texts_name_the_place() {
     let cases: &[(String, Code, &[&str])] = &[
         (wrap(&["a", "a"], &[]), Code::UrdfTwice, &["r.urdf:3", "\"a\""]),
         (wrap(&["a"], &[fixed("j1", "a", "b2")]), Code::LinkUnknown, &["r.urdf:3", "\"b2\""]),
-        (wrap(&["a", "b"], &[joint("j1", "Revolute", "a", "b", Z)]), Code::UrdfElement, &["Revolute", "revolute"]),
+        (
+            wrap(&["a", "b"], &[joint("j1", "Revolute", "a", "b", Z)]),
+            Code::UrdfElement,
+            &["\"Revolute\"", "type=\"revolute\""],
+        ),
+        (
+            wrap(&["a", "b"], &[joint("j1", "", "a", "b", Z).replace(" type=\"\"", "")]),
+            Code::UrdfElement,
+            &["\"j1\"", "revolute"],
+        ),
         (wrap(&["a", "b", "c"], &[fixed("j", "a", "c"), fixed("k", "b", "c")]), Code::TreeBroken, &["\"k\"", "\"j\""]),
         (wrap(&["a", "b"], &[fixed("j", "a", "b"), fixed("k", "b", "a")]), Code::TreeBroken, &[]),
         (wrap(&["a", "b", "c"], &[fixed("j", "a", "b"), fixed("j", "b", "c")]), Code::UrdfTwice, &["\"j\""]),
         ("<robot name='r'>\n<link name='a'>\n</robot>".into(), Code::UrdfSyntax, &["r.urdf:3"]),
+        // Files that were cut off: between elements, within one, within an attribute.
+        ("<robot name='r'>\n<link name='a'/>\n<link name='b'/>\n".into(), Code::UrdfSyntax, &["r.urdf:3", "</robot>"]),
+        ("<robot name='r'>\n<link name='a'/>\n<link".into(), Code::UrdfSyntax, &["r.urdf:3", "</robot>"]),
+        ("<robot name='r'>\n<link name='a'/>\n<link name='b".into(), Code::UrdfSyntax, &["r.urdf:3", "</robot>"]),
         ("<sdf/>".into(), Code::UrdfSyntax, &["<sdf>"]),
         ("<robot name='r'/>".into(), Code::UrdfElement, &[]),
     ];
     for (text, code, names) in cases {
         assert_says(&refusal(text), *code, names);
+    }
+    for (encoding, bytes) in
+        [("UTF-16LE", u16::to_le_bytes as fn(u16) -> [u8; 2]), ("UTF-16BE", u16::to_be_bytes as fn(u16) -> [u8; 2])]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("r.urdf");
+        std::fs::write(&path, wrap(&["a"], &[]).encode_utf16().flat_map(bytes).collect::<Vec<u8>>()).unwrap();
+        assert_says(&read(&path).unwrap_err(), Code::TextEncoding, &["r.urdf", encoding, "UTF-8"]);
     }
     let error = read(Path::new("no/such.urdf")).unwrap_err();
     assert_says(&error, Code::FileMissing, &["no/such.urdf"]);
@@ -295,6 +316,15 @@ fn a_joint_without_limits_is_told_of_and_one_that_follows_another_is_not() {
         let codes: Vec<Code> = robot(&wrap(&["a", "b", "c"], &joints)).notices.iter().map(|n| n.code).collect();
         assert_eq!(codes, vec![Code::UrdfUnlimited; usize::from(told)], "{kind} {inner}");
     }
+    // Of all joints of a file it is told once, by their names.
+    let joints = [
+        joint("j", "revolute", "a", "b", Z),
+        joint("k", "prismatic", "b", "c", Z),
+        joint("l", "revolute", "c", "d", Z),
+    ];
+    let notices = robot(&wrap(&["a", "b", "c", "d"], &joints)).notices;
+    assert_eq!(notices.len(), 1, "{notices:?}");
+    assert_says(&notices[0], Code::UrdfUnlimited, &["r.urdf:6", "j, k, l", "urdfdom", "pinocchio"]);
 }
 
 #[test]
