@@ -4,7 +4,7 @@ mod code;
 mod quantity;
 
 use std::fmt;
-use std::path::Path;
+use std::path::{MAIN_SEPARATOR, Path};
 
 pub use code::{Code, ErrorKind};
 pub use quantity::Quantity;
@@ -40,6 +40,9 @@ impl Error {
     /// A file that could not be read or written.
     pub fn io(path: &Path, error: &std::io::Error) -> Self {
         let (code, remedy) = match error.kind() {
+            std::io::ErrorKind::NotFound if path.to_string_lossy().contains('\\') && MAIN_SEPARATOR == '/' => {
+                (Code::FileMissing, "write / between folders: here a backslash is a character of a name")
+            }
             std::io::ErrorKind::NotFound => (Code::FileMissing, "check the path and its spelling"),
             std::io::ErrorKind::PermissionDenied => {
                 (Code::FileForbidden, "check the permissions of the file and its folder")
@@ -49,6 +52,9 @@ impl Error {
             }
             std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
                 (Code::FileFailed, "the disk (or your share of it) is full: make room, or write to another one")
+            }
+            std::io::ErrorKind::ReadOnlyFilesystem => {
+                (Code::FileFailed, "the file system cannot be written to: write to another place")
             }
             _ => (Code::FileFailed, "check that the disk is readable and not full"),
         };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::measurement_series::file_name;
 use super::table::composed;
-use crate::error::{Error, Result, plain_name};
+use crate::error::{Code, Error, Result, plain_name};
 
 const IMAGE_EXTENSIONS: [&str; 9] = ["png", "tif", "tiff", "pgm", "pnm", "ppm", "jpg", "jpeg", "bmp"];
 
@@ -16,7 +16,10 @@ pub fn is_image(path: &Path) -> bool {
 
 /// Image files of a folder in the order of their names.
 pub(super) fn image_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, &e))?;
+    let entries = std::fs::read_dir(folder).map_err(|e| match Error::io(folder, &e) {
+        error if error.code == Code::FileMissing => Error { remedy: "copy the images into it".to_owned(), ..error },
+        error => error,
+    })?;
     let mut files = Vec::new();
     for entry in entries {
         let path = entry.map_err(|e| Error::io(folder, &e))?.path();

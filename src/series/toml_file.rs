@@ -73,22 +73,26 @@ pub(super) fn parse_toml<T: DeserializeOwned>(path: &Path, text: &str) -> Result
         let line = error.span().map(|s| 1 + text[..s.start.min(text.len())].matches('\n').count());
         let place = line.map_or_else(|| path.display().to_string(), |l| format!("{}:{l}", path.display()));
         let message = error.message().trim().replace('\n', "; ");
-        let remedy = toml_remedy(&message);
+        let has_backslash = line.and_then(|l| text.lines().nth(l - 1)).is_some_and(|line| line.contains('\\'));
+        let remedy = toml_remedy(&message, has_backslash);
         Error::new(Code::SettingSyntax, place, message, remedy)
     })?;
     plain_toml(path, text)?;
     Ok(value)
 }
 
+/// What to do where a backslash stands in double quotes.
+const BACKSLASH: &str = "within double quotes a backslash begins a character such as \\n: write / between folders, or set the path in single quotes";
+
 /// Keys and strings of a TOML file without control characters; the line is that of the innermost key.
 fn plain_toml(path: &Path, text: &str) -> Result<()> {
-    fn walk(value: &toml::Value, key: &str, place: &dyn Fn(&str) -> String) -> Result<()> {
+    fn walk(value: &toml::Value, key: &str, check: &dyn Fn(&str, &str, &str) -> Result<()>) -> Result<()> {
         match value {
-            toml::Value::String(text) => plain_name(key, text, place(key)).map(|_| ()),
-            toml::Value::Array(all) => all.iter().try_for_each(|v| walk(v, key, place)),
+            toml::Value::String(text) => check(key, text, key),
+            toml::Value::Array(all) => all.iter().try_for_each(|v| walk(v, key, check)),
             toml::Value::Table(all) => all.iter().try_for_each(|(k, v)| {
-                plain_name("key", k, place(key))?;
-                walk(v, k, place)
+                check("key", k, key)?;
+                walk(v, k, check)
             }),
             _ => Ok(()),
         }
@@ -97,11 +101,15 @@ fn plain_toml(path: &Path, text: &str) -> Result<()> {
         let line = text.lines().position(|l| l.trim_start().starts_with(key) && l.contains('\\'));
         line.map_or_else(|| path.display().to_string(), |l| format!("{}:{}", path.display(), l + 1))
     };
-    toml::from_str::<toml::Value>(text).map_or(Ok(()), |value| walk(&value, "", &place))
+    let check = |kind: &str, name: &str, key: &str| match plain_name(kind, name, place(key)) {
+        Err(error) if !text.contains(name) => Err(Error { remedy: BACKSLASH.to_owned(), ..error }),
+        checked => checked.map(|_| ()),
+    };
+    toml::from_str::<toml::Value>(text).map_or(Ok(()), |value| walk(&value, "", &check))
 }
 
 /// What to try after a message of the TOML reader, which quotes names in backticks: the offender, then what it knows.
-fn toml_remedy(message: &str) -> String {
+fn toml_remedy(message: &str, has_backslash: bool) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
     let first = quoted.next().unwrap_or_default();
     if message.starts_with("unknown") {
@@ -115,7 +123,12 @@ fn toml_remedy(message: &str) -> String {
     if message.starts_with("missing field") {
         return format!("add {first} = ...");
     }
-    "correct the line (text stands in quotes, numbers have a decimal point)".into()
+    let remedy = if has_backslash {
+        BACKSLASH
+    } else {
+        "correct the line (text stands in quotes, numbers have a decimal point)"
+    };
+    remedy.to_owned()
 }
 
 #[cfg(test)]
@@ -127,14 +140,14 @@ mod tests {
     fn a_value_that_is_none_of_those_known_is_told_which_there_are() {
         let both = &["deg", "rad"][..];
         for (unit, meant) in [("degree", both), ("degr", &["deg"]), ("mrad", both), ("mdeg", both), ("grad", both)] {
-            let remedy = toml_remedy(&format!("unknown variant `{unit}`, expected `deg` or `rad`"));
+            let remedy = toml_remedy(&format!("unknown variant `{unit}`, expected `deg` or `rad`"), false);
             assert!(meant.iter().all(|unit| remedy.contains(&format!("\"{unit}\""))), "{remedy}");
         }
     }
 
     #[test]
     fn a_key_of_another_unit_is_converted_not_renamed() {
-        let remedy = toml_remedy("unknown field `pitch_mm`, expected one of `rows`, `pitch_m`");
+        let remedy = toml_remedy("unknown field `pitch_mm`, expected one of `rows`, `pitch_m`", false);
         assert_eq!(remedy, renaming("pitch_mm", "pitch_m"));
     }
 }
