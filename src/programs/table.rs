@@ -18,7 +18,7 @@ use super::reason::Why;
 use super::text_file::TextFile;
 use crate::error::{Code, Error, Notice, Result, closest_name, renaming};
 use crate::geom::Pose;
-use crate::series::{AngleUnit, check_unit, remedy_of_prefix};
+use crate::series::{AngleUnit, StatedUnit, check_unit, remedy_of_names};
 use crate::urdf::JointKind;
 
 const POSE_COLUMNS: [&str; 7] = ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"];
@@ -103,6 +103,16 @@ fn is_external(name: &str) -> bool {
     [name.strip_prefix('e'), numbered].into_iter().flatten().any(is_number) || name.starts_with("eax_")
 }
 
+/// The unit of the joint columns, where it is stated.
+fn stated_unit(setting: &ProgramSetting<'_>) -> Option<AngleUnit> {
+    setting.rad_per_unit.map(|rad| if rad == 1.0 { AngleUnit::Rad } else { AngleUnit::Deg })
+}
+
+/// How it is stated.
+fn stating(unit: &str) -> String {
+    format!("give --joint-unit {unit}")
+}
+
 fn columns(file: &TextFile, header: &Row, setting: &ProgramSetting<'_>) -> Result<Columns> {
     let text = |r: &Range<usize>| String::from_utf8_lossy(&file.bytes[r.clone()]).into_owned();
     let names: Vec<String> = header.cells.iter().map(text).collect();
@@ -135,7 +145,8 @@ fn columns(file: &TextFile, header: &Row, setting: &ProgramSetting<'_>) -> Resul
     let joints = all(&readings)?;
     if pose.is_none() && joints.is_empty() {
         let what = format!("has neither joint columns nor pose columns (its columns are {})", names.join(", "));
-        let remedy = remedy_of_prefix(&readings, &names)
+        let unit = stated_unit(setting).map(|unit| StatedUnit { unit, stating: &stating });
+        let remedy = remedy_of_names(&readings, &names, unit)
             .unwrap_or_else(|| format!("name them {}, or {}", readings.join(", "), POSE_COLUMNS.join(", ")));
         return Err(Error::new(Code::CsvColumnMissing, place(), what, remedy));
     }
@@ -273,7 +284,7 @@ impl Table<'_> {
 
     /// Refuses joint columns that cannot be in the stated unit.
     fn check_unit(&self, targets: &[Target]) -> Result<()> {
-        let Some(rad) = self.setting.rad_per_unit else { return Ok(()) };
+        let Some(unit) = stated_unit(self.setting) else { return Ok(()) };
         let fields = |target: &Target| match &target.kind {
             TargetKind::Joints(joints) => joints.fields.clone(),
             TargetKind::Pose(pose) => pose.joint_fields.clone(),
@@ -283,11 +294,8 @@ impl Table<'_> {
             .map(|target| fields(target).iter().flatten().map(|field| field.written).collect())
             .filter(|row: &Vec<f64>| row.iter().all(|q| q.is_finite()))
             .collect();
-        let unit = if rad == 1.0 { AngleUnit::Rad } else { AngleUnit::Deg };
         let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
-        check_unit(Path::new(&self.file.name), unit, self.setting.chain, &rows, |unit| {
-            format!("give --joint-unit {unit}")
-        })
+        check_unit(Path::new(&self.file.name), unit, self.setting.chain, &rows, stating)
     }
 
     /// SI value and decimals of every reading's unit.

@@ -7,7 +7,8 @@ use std::path::Path;
 use unicode_normalization::UnicodeNormalization;
 
 use super::inputs::{InputFile, read_text};
-use super::joint_prefix::remedy_of_prefix;
+use super::joint_names::{StatedUnit, remedy_of_names};
+use super::spreadsheet::{is_date, mark_of_thousands};
 use crate::error::{Code, Error, Result, closest_name, plain_name, renaming};
 use crate::files::FileKind;
 
@@ -220,11 +221,11 @@ impl Table {
         })
     }
 
-    /// The columns of joints, in their order.
-    pub fn require_joints(&self, joints: &[String]) -> Result<Vec<usize>> {
+    /// The columns of joints, in their order, with angles in the stated unit.
+    pub fn require_joints(&self, joints: &[String], unit: StatedUnit<'_>) -> Result<Vec<usize>> {
         let missing: Vec<&str> = joints.iter().map(String::as_str).filter(|name| self.column(name).is_none()).collect();
         let columns = joints.iter().map(|name| self.require(name)).collect::<Result<_>>();
-        columns.map_err(|error| match remedy_of_prefix(&missing, &self.headers) {
+        columns.map_err(|error| match remedy_of_names(&missing, &self.headers, Some(unit)) {
             Some(remedy) => Error { remedy, ..error },
             None => error,
         })
@@ -255,20 +256,32 @@ impl Table {
                     let what = format!("is not a number for its {sign}");
                     return Err(self.refuse(Code::CsvNumber, row, column, &what, remedy));
                 }
-                let remedy = match cell.contains(',') {
-                    true => "write numbers with a decimal point",
-                    false => "write a finite number",
+                let (what, remedy) = match (is_date(cell), cell.contains(',')) {
+                    (true, _) => (
+                        "is a date or a time",
+                        "write the number anew, and in a spreadsheet format the column as text first: it makes dates of numbers",
+                    ),
+                    (_, true) => {
+                        ("is not a number", "write numbers with a decimal point, and nothing between thousands")
+                    }
+                    _ => ("is not a number", "write a finite number"),
                 };
-                Err(self.refuse(Code::CsvNumber, row, column, "is not a number", remedy))
+                Err(self.refuse(Code::CsvNumber, row, column, what, remedy))
             }
         }
     }
 
-    /// The sign without which a cell is a number, and what to do about it.
+    /// The sign (or unit, or mark between thousands) without which a cell is a number, and what to do about it.
     pub fn without_sign(&self, row: Row<'_>, column: usize) -> Option<(String, &'static str)> {
         let cell = row.cell(column);
         if cell.parse::<f64>().is_ok() {
             return None;
+        }
+        if let Some(mark) = mark_of_thousands(cell) {
+            return Some((
+                format!("mark between thousands ({mark})"),
+                "write numbers without it and with a decimal point, throughout the column",
+            ));
         }
         let plain = cell.replace(MINUS, "-");
         let unit = UNITS.into_iter().find(|unit| plain.ends_with(unit));
@@ -365,16 +378,34 @@ pub fn csv_line(row: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::series::AngleUnit;
+
+    #[test]
+    fn a_number_that_a_spreadsheet_wrote_otherwise_is_told_why_it_is_none() {
+        let table =
+            |cell: &str| Table::parse(Path::new("joints.csv"), &format!("image,j1\na.png,\"{cell}\"\n")).unwrap();
+        let error = |cell: &str| {
+            let table = table(cell);
+            table.number(table.rows().next().unwrap(), 1).map_err(|e| (e.code, e.place, e.what, e.remedy)).unwrap_err()
+        };
+        let plain = error("a few");
+        for (cell, datum) in [("1'234.5", "(')"), ("1,234.5", "(,)"), ("12. Mai", "date"), ("2026-05-12", "date")] {
+            let (code, place, what, remedy) = error(cell);
+            assert_eq!((code, place.as_str()), (Code::CsvNumber, "joints.csv:2"));
+            assert!(what.contains(cell) && what.contains(datum) && remedy != plain.3, "{what}: {remedy}");
+        }
+    }
 
     #[test]
     fn joints_that_stand_with_a_prefix_are_told_so_and_others_renamed() {
         let remedy = |header: &str| {
             let table = Table::parse(Path::new("points.csv"), &format!("x_m,{header}\n0,1,2\n")).unwrap();
-            table.require_joints(&["joint_1".to_owned(), "joint_2".to_owned()]).unwrap_err().remedy
+            let unit = StatedUnit { unit: AngleUnit::Rad, stating: &|_| unreachable!() };
+            table.require_joints(&["joint_1".to_owned(), "joint_2".to_owned()], unit).unwrap_err().remedy
         };
         let names = |all: [&str; 2]| all.map(str::to_owned);
         let missing = ["joint_1", "joint_2"];
-        let of_prefix = remedy_of_prefix(&missing, &names(["left_joint_1", "left_joint_2"]));
+        let of_prefix = remedy_of_names(&missing, &names(["left_joint_1", "left_joint_2"]), None);
         assert_eq!(Some(remedy("left_joint_1,left_joint_2")), of_prefix);
         assert_eq!(remedy("jont_1,joint_2"), renaming("jont_1", "joint_1"));
     }

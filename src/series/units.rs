@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::joint_prefix::remedy_of_prefix;
+use super::joint_names::{StatedUnit, remedy_of_names};
 use super::joints::Stops;
 use super::manifest::AngleUnit;
 use crate::error::{Code, Error, Notice, Result};
@@ -53,7 +53,7 @@ pub(super) fn readings_for(
     chain: &Chain,
     stating: impl Fn(&str) -> String,
 ) -> Result<Vec<Option<Vec<f64>>>> {
-    let columns = columns_of(file, stops, chain)?;
+    let columns = columns_of(file, stops, chain, StatedUnit { unit, stating: &stating })?;
     let raw: Vec<Option<Vec<f64>>> = stops
         .stops
         .iter()
@@ -64,12 +64,17 @@ pub(super) fn readings_for(
     Ok(raw.into_iter().map(|row| row.map(|q| to_si(chain, unit, &q))).collect())
 }
 
-fn columns_of(file: &Path, stops: &Stops, chain: &Chain) -> Result<Vec<usize>> {
-    let find = |name: &String| stops.joints.iter().position(|j| j == name);
-    let missing: Vec<&str> = chain.readings.iter().filter(|n| find(n).is_none()).map(String::as_str).collect();
-    if missing.is_empty() {
-        return Ok(chain.readings.iter().filter_map(find).collect());
+/// The columns of the readings of a chain; none where some are missing.
+fn columns(stops: &Stops, chain: &Chain) -> Option<Vec<usize>> {
+    chain.readings.iter().map(|name| stops.joints.iter().position(|joint| joint == name)).collect()
+}
+
+fn columns_of(file: &Path, stops: &Stops, chain: &Chain, stated: StatedUnit<'_>) -> Result<Vec<usize>> {
+    if let Some(columns) = columns(stops, chain) {
+        return Ok(columns);
     }
+    let is_missing = |name: &&String| !stops.joints.contains(name);
+    let missing: Vec<&str> = chain.readings.iter().filter(is_missing).map(String::as_str).collect();
     let what = format!(
         "has no readings of {} (needed from {} to {}); its joint columns are: {}",
         missing.join(", "),
@@ -77,7 +82,7 @@ fn columns_of(file: &Path, stops: &Stops, chain: &Chain) -> Result<Vec<usize>> {
         chain.tip,
         stops.joints.join(", ")
     );
-    let remedy = remedy_of_prefix(&missing, &stops.joints)
+    let remedy = remedy_of_names(&missing, &stops.joints, Some(stated))
         .unwrap_or_else(|| "name the columns as the joints in the URDF, or choose another base or tip".to_owned());
     Err(Error::new(Code::JointMissing, file.display(), what, remedy))
 }
@@ -276,7 +281,7 @@ pub(super) fn notices(file: &Path, (stops, view): (&Stops, bool), unit: AngleUni
     }
     notices.extend(unused_covariates(file, stops));
     notices.extend(equal_columns(file, stops, chain));
-    let Ok(columns) = columns_of(file, stops, chain) else { return notices };
+    let Some(columns) = columns(stops, chain) else { return notices };
     for (reading, column) in columns.into_iter().enumerate() {
         notices.extend(beyond_limits(file, (stops, view), unit, chain, (reading, column)));
     }

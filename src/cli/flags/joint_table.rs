@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 
 use crate::error::{Code, Error, Result};
-use crate::series::{AngleUnit, Row, Table, check_unit};
+use crate::series::{AngleUnit, Row, StatedUnit, Table, check_unit};
 use crate::urdf::{Chain, JointKind};
 
 /// Unit of revolute joints in a file.
@@ -51,7 +51,9 @@ fn read_rows(
 ) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
     let table = Table::read(path, &mut Vec::new())?;
     let columns = |names: &[&str]| names.iter().map(|name| table.require(name)).collect::<Result<Vec<usize>>>();
-    let (plain, joints) = (columns(first)?, table.require_joints(&chain.readings)?);
+    let stating = |unit: &str| format!("give {flag} {unit}");
+    let stated = StatedUnit { unit: unit.into(), stating: &stating };
+    let (plain, joints) = (columns(first)?, table.require_joints(&chain.readings, stated)?);
     let numbers = |row, columns: &[usize]| columns.iter().map(|c| table.number(row, *c)).collect::<Result<Vec<f64>>>();
     let read = |row| -> Result<(Vec<f64>, Vec<f64>)> { Ok((numbers(row, &plain)?, numbers(row, &joints)?)) };
     let mut rows: Vec<(Vec<f64>, Vec<f64>)> =
@@ -61,7 +63,7 @@ fn read_rows(
         return Err(Error::new(Code::FileEmpty, place, "no row of numbers", "write one joint vector per row"));
     }
     let as_written: Vec<&[f64]> = rows.iter().map(|(_, readings)| readings.as_slice()).collect();
-    check_unit(path, unit.into(), chain, &as_written, |unit| format!("give {flag} {unit}"))?;
+    check_unit(path, unit.into(), chain, &as_written, stating)?;
     if unit == Unit::Deg {
         let turning = |kind: &JointKind| *kind != JointKind::Prismatic;
         for (_, readings) in &mut rows {

@@ -17,7 +17,7 @@ use super::samples::{JointSample, shared};
 use crate::error::{Code, Error, Notice, Result, plain_name};
 use crate::linalg::median_by;
 use crate::series::InputFile;
-use crate::series::joint_prefix::remedy_of_prefix;
+use crate::series::joint_names::remedy_of_names;
 
 /// The joint states of a robot.
 pub(super) struct JointReadings {
@@ -377,7 +377,7 @@ impl Scan {
         }
         if !missing.is_empty() {
             let what = format!("has no positions of {}; its joints are: {}", missing.join(", "), names.join(", "));
-            let remedy = remedy_of_prefix(&missing, &names)
+            let remedy = remedy_of_names(&missing, &names, None)
                 .unwrap_or_else(|| "compare with the joint names in the URDF, or choose another tip".to_owned());
             return Err(Error::new(Code::JointMissing, place, what, remedy));
         }
