@@ -233,15 +233,10 @@ pub(super) fn in_order<'a>(
 }
 
 /// No observation at all is an error: nothing could be solved from it.
-pub(super) fn require_some(path: &Path, table: &str, images: &[ImageObservations]) -> Result<()> {
+pub(super) fn require_some(path: &Path, table: &str, images: &[ImageObservations], remedy: &str) -> Result<()> {
     if images.is_empty() {
         let what = format!("has no usable observation of any image in {table}");
-        return Err(Error::new(
-            Code::ObservationsMissing,
-            path.display(),
-            what,
-            "compare the image names in both files",
-        ));
+        return Err(Error::new(Code::ObservationsMissing, path.display(), what, remedy));
     }
     Ok(())
 }

@@ -1,12 +1,12 @@
 //! Reading a series folder.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 
 use super::controller_file;
 use super::controller_poses::ControllerPoses;
 use super::image_file;
-use super::image_folder::{by_name, image_files, other_files};
+use super::image_folder::{by_name, image_files, is_image, other_files};
 use super::inputs::InputFile;
 use super::joints::{SeriesStop, StopKey, Stops};
 use super::light::{Light, lights_of, unused_light, unused_light_of_one};
@@ -293,18 +293,18 @@ fn observed(
     let images = observation_file::read(path, plate, &size, inputs)?;
     let (ordered, strange) = observation_file::in_order(images, stops.stops.iter().map(|s| s.image.as_str()));
     let table = controller_file::table_of_stops(path.parent().unwrap_or(path));
-    observation_file::require_some(path, table, &ordered)?;
-    if !strange.is_empty() {
-        let what = format!("observes {} that {table} does not name: {}", count(strange.len()), some(&strange));
-        notices.push(Notice::new(
-            Code::ImageUnlisted,
-            path.display(),
-            what,
-            "they are not used; add rows with empty joint cells to use them",
-        ));
-    }
     let seen: BTreeSet<&str> = ordered.iter().map(|i| i.image.as_str()).collect();
     let unseen: Vec<_> = stops.stops.iter().map(|s| s.image.clone()).filter(|i| !seen.contains(i.as_str())).collect();
+    let alike = alike(&strange, &unseen).map(|(here, there)| {
+        format!("\"{here}\" is \"{there}\" in {table}: write the names alike, with case and ending")
+    });
+    let remedy = alike.as_deref().unwrap_or("compare the image names in both files");
+    observation_file::require_some(path, table, &ordered, remedy)?;
+    if !strange.is_empty() {
+        let what = format!("observes {} that {table} does not name: {}", count(strange.len()), some(&strange));
+        let remedy = alike.as_deref().unwrap_or("they are not used; add rows with empty joint cells to use them");
+        notices.push(Notice::new(Code::ImageUnlisted, path.display(), what, remedy));
+    }
     if !unseen.is_empty() {
         let what = format!("has no observation of {} in {table}: {}", count(unseen.len()), some(&unseen));
         notices.push(Notice::new(Code::ObservationsMissing, path.display(), what, "they are left out"));
@@ -404,6 +404,16 @@ fn similar<'a>(name: &str, names: &'a BTreeSet<String>) -> Option<&'a str> {
         there.eq_ignore_ascii_case(name) || stem(there) == stem(name) || stem(there) == name.to_lowercase()
     };
     names.iter().find(same).map(String::as_str)
+}
+
+/// The first of these names that is one of the others but for case and ending, and that.
+fn alike<'a>(names: &'a [String], others: &'a [String]) -> Option<(&'a str, &'a str)> {
+    let bare = |name: &str| {
+        let stem = Path::new(name).file_stem().filter(|_| is_image(Path::new(name)));
+        stem.map_or_else(|| name.to_lowercase(), |stem| stem.to_string_lossy().to_lowercase())
+    };
+    let others: BTreeMap<String, &str> = others.iter().map(|name| (bare(name), name.as_str())).collect();
+    names.iter().find_map(|name| others.get(&bare(name)).map(|other| (name.as_str(), *other)))
 }
 
 fn count(images: usize) -> String {

@@ -125,6 +125,18 @@ fn a_bad_manifest_names_line_and_key() {
     assert_says(&replaced("plate = \"plate.toml\"\n", ""), Code::SettingMissing, &["series.toml", "plate.toml"]);
     assert_says(&replaced("plate.toml", "plat.toml"), Code::FileMissing, &["plat.toml"]);
     assert_says(&read(Path::new("no/such/folder")).unwrap_err(), Code::FileMissing, &["no/such/folder"]);
+    // Paths of Windows, of which some are escapes that there are.
+    for (path, code) in [
+        (r"C:\plates\plate.toml", Code::SettingSyntax),
+        (r"C:\users\plate.toml", Code::SettingSyntax),
+        (r"C:\new\table.toml", Code::NameUnprintable),
+    ] {
+        assert_says(&replaced("plate.toml", path), code, &["series.toml:4", "backslash", "single quotes"]);
+    }
+    let misspelt = replaced("plate = \"plate.toml\"", r"plte = 'C:\plates\plate.toml'");
+    assert_says(&misspelt, Code::SettingSyntax, &["series.toml:4", "\"plate\""]);
+    #[cfg(not(windows))]
+    assert_says(&replaced("\"plate.toml\"", r"'sub\plate.toml'"), Code::FileMissing, &[r"sub\plate.toml", "backslash"]);
 }
 
 #[test]
@@ -139,6 +151,13 @@ fn a_bad_joint_table_names_line_and_column() {
         let throughout = format!("image,j1,j2,x\na.png,0.1,{one},0.5\nb.png,0.2,{other},0.5\n");
         assert_says(&with(&throughout), Code::CsvNumber, &["joints.csv:2", "column j2", sign]);
     }
+    // Numbers as spreadsheets show them; throughout a column, too, where they are no remark.
+    for (cells, sign) in [(["1'250.5", "1'500"], "(')"), (["\"1,250.5\"", "\"1,500.5\""], "(,)")] {
+        let [one, other] = cells;
+        let throughout = format!("image,j1,j2,x\na.png,0.1,{one},0.5\nb.png,0.2,{other},0.5\n");
+        assert_says(&with(&throughout), Code::CsvNumber, &["joints.csv:2", "column j2", sign]);
+    }
+    assert_says(&with(&JOINTS.replace("1.5", "1. Mai")), Code::CsvNumber, &["joints.csv:3", "column j2", "date"]);
     assert_says(&with(&JOINTS.replace("1.5", "nan")), Code::CsvNumber, &["joints.csv:3", "nan"]);
     assert_says(&with(&JOINTS.replace("1.5", "\"1,5\"")), Code::CsvNumber, &["joints.csv:3", "\"1,5\""]);
     assert_says(&with(&JOINTS.replace("1.5", "1,5")), Code::CsvCellCount, &["joints.csv:3", "5 ", " 4 "]);
@@ -168,6 +187,11 @@ fn a_bad_joint_table_names_line_and_column() {
     let folder = series_with(&[]);
     fs::write(folder.path().join("joints.csv"), [0xff, 0xfe, b'i', 0]).unwrap();
     assert_says(&read(folder.path()).unwrap_err(), Code::TextEncoding, &["UTF-16", "UTF-8"]);
+    for bytes in [u16::to_le_bytes as fn(u16) -> [u8; 2], u16::to_be_bytes] {
+        fs::write(folder.path().join("joints.csv"), JOINTS.encode_utf16().flat_map(bytes).collect::<Vec<u8>>())
+            .unwrap();
+        assert_says(&read(folder.path()).unwrap_err(), Code::TextEncoding, &["joints.csv", "UTF-16", "UTF-8"]);
+    }
     fs::write(folder.path().join("joints.csv"), b"image,j1\na.png,1\n\xfcber.png,2\n").unwrap();
     assert_says(&read(folder.path()).unwrap_err(), Code::TextEncoding, &["joints.csv:3", "UTF-8"]);
 }
@@ -302,6 +326,14 @@ fn readings_are_matched_by_name_in_si() {
     let series = read(series_with(&[("series.toml", &degrees), ("joints.csv", &renamed)]).path()).unwrap();
     let error = series.readings_for(&chain).unwrap_err();
     assert_says(&error, Code::JointMissing, &["joints.csv", "j1", "j2, x, spare, joint1"]);
+    for (unit, other) in [("deg", "rad"), ("rad", "deg")] {
+        let of_unit = joints.replace("j1", &format!("j1 [{unit}]"));
+        let series = read(series_with(&[("series.toml", &degrees), ("joints.csv", &of_unit)]).path()).unwrap();
+        let error = series.readings_for(&chain).unwrap_err();
+        assert_says(&error, Code::JointMissing, &["joints.csv", &format!("\"j1 [{unit}]\" to \"j1\"")]);
+        // words: what would state the other unit, where the column contradicts the stated one.
+        assert_eq!(error.remedy.contains("joint_unit = \"rad\""), other == "deg", "{}", error.remedy);
+    }
 }
 
 #[test]
@@ -456,6 +488,13 @@ fn observations_replace_images_and_are_checked_by_line() {
     assert_says(&with("a.png,1,1,2,,1,,1,,,"), Code::CsvNumber, &["observations.csv:2", "cov_uv"]);
     assert_says(&with("a.png,1,1,2,,,,,,,\na.png,1,1,3,,,,,,,"), Code::CsvRowTwice, &["observations.csv:3", "line 2"]);
     assert_says(&with("c.png,1,1,2,,,,,,,"), Code::ObservationsMissing, &["observations.csv"]);
+    for name in ["A.PNG", "a", "a.tif"] {
+        let pair = format!("\"{name}\" is \"a.png\"");
+        assert_says(&with(&format!("{name},1,1,2,,,,,,,")), Code::ObservationsMissing, &["observations.csv", &pair]);
+        let beside = good.replace("gone.png", name);
+        let series = read(series_with(&[("observations.csv", &beside)]).path()).unwrap();
+        assert_says(&series.notices[0], Code::ImageUnlisted, &[&pair]);
+    }
     let misspelt = refusal(&[("observations.csv", "image,marker,u,v,egde\na.png,1,1,2,inner\n")]);
     assert_says(&misspelt, Code::CsvColumnUnknown, &["observations.csv:1", "egde", "\"edge\""]);
 }
