@@ -39,7 +39,7 @@ impl Moving {
                 continue;
             }
             // No number where a given delay meets a speed that is not known: it counts as given.
-            let off = sigma_s.ok_or_else(|| unknown(place))? * joints.speed;
+            let off = sigma_s.ok_or_else(|| unknown(place, still, times))? * joints.speed;
             if off > MOST_OFF {
                 moving.left_out += 1;
                 continue;
@@ -72,9 +72,17 @@ impl Moving {
 
 const REMEDY: &str = "state the delay where it is known (--image-delay SECONDS), or move slowly while images are taken";
 
-fn unknown(place: &str) -> Error {
-    let what = "images are to be taken in motion, and motion in the images does not tell their delay: where the robot was at an image is not known";
-    let remedy = "state the delay (--image-delay SECONDS, 0 where the stamps are right), or take 5 images a second or more over the motions";
+/// Motions between standstills tell the delay, and not those of a robot that drives on at one speed: the pictures change alike all the time.
+fn unknown(place: &str, still: &[Standstill], times: &[i64]) -> Error {
+    let span_s = times.first().zip(times.last()).map_or(0.0, |(from, to)| 1e-9 * (to - from) as f64);
+    let what = format!(
+        "images are to be taken in motion, and what they show does not tell their delay: where the robot was at an image is not known ({} images in {span_s:.0} s, {} \
+         standstills of the robot)",
+        times.len(),
+        still.len()
+    );
+    let remedy = "state the delay (--image-delay SECONDS, 0 where the stamps are right), or let the robot stand for a second or more between motions, \
+                  with 5 images a second or more all the time: begin and end of motions tell it";
     Error::new(Code::ImageDelayUnchecked, place, what, remedy)
 }
 
@@ -105,7 +113,14 @@ mod tests {
         assert_eq!(moving.notice("run", Some(2e-3)).map(|n| n.code), Some(Code::ImagesInMotion));
         assert_eq!(counted(0.0), (31, 0));
         assert!(of(Some(0.0)).unwrap().notice("run", Some(0.0)).is_none());
-        assert_eq!(of(None).unwrap_err().code, Code::ImageDelayUnchecked);
+        let unknown = of(None).unwrap_err();
+        assert_eq!(unknown.code, Code::ImageDelayUnchecked);
+        // words: what was there.
+        assert!(
+            ["31 images in 3 s", "0 standstills"].iter().all(|there| unknown.what.contains(there)),
+            "{}",
+            unknown.what
+        );
         let standing = Standstill { from_ns: 0, to_ns: 3_000_000_000 };
         assert!(Moving::of("run", (&postures, &[standing]), &times, 0.1, None).unwrap().taken.is_empty());
     }
