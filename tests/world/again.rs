@@ -43,7 +43,7 @@ fn from_its_own_file_a_result_is_solved_again_bit_for_bit_with_its_own_options()
     // Limits of a file take the place of the recorded ones; a name that is none is refused.
     assert!(codes(&first).contains(&"few_images"), "{:?}", codes(&first));
     std::fs::write(at.join("few.toml"), "[limits]\nfew_images = 0\n").unwrap();
-    run(at, &["identify", "--from", "first/solution.json", "--config", "few.toml", "--out", "few"]);
+    run(at, &["identify", "--from", "first", "--config", "few.toml", "--out", "few"]);
     let few = record(at, "few");
     assert!(!codes(&few).contains(&"few_images"), "{:?}", codes(&few));
     assert_eq!(few["options"]["limits"]["few_images"], 0);

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::Deserialize;
 
 use super::at::{AtArgs, AtTable};
-use super::show::{read_solution, read_solution_with_bytes};
+use super::show::{read_solution, read_solution_with_bytes, solution_file};
 use super::{long_table, summary};
 use crate::calibration::{Calibration, Ends, Export, Inputs, Observed};
 use crate::cli::Verdict;
@@ -121,11 +121,12 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let claim = |folder: &Path| args.at.place(ResultFolder::claim(folder, FILE_NAME)?);
     // Tried before the work that the result costs.
     let mut place = args.out.as_deref().filter(|_| !args.dry_run).map(claim).transpose()?;
-    let earlier = args.from.as_deref().map(read_solution).transpose()?;
+    let from = args.from.as_deref().map(solution_file);
+    let earlier = from.as_deref().map(read_solution).transpose()?;
     let options = args.choices.options(earlier.as_ref().map_or_else(Options::default, restore::options))?;
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
     let mut at = None;
-    let mut observed = match (earlier.as_ref().zip(args.from.as_deref()), &args.urdf) {
+    let mut observed = match (earlier.as_ref().zip(from.as_deref()), &args.urdf) {
         (Some((record, path)), _) => Observed::of_record(record, path, ends)?,
         (None, urdf) => {
             let inputs = match urdf {

@@ -45,6 +45,11 @@ pub struct ShowArgs {
     at: AtArgs,
 }
 
+/// The file of a solution: that of a folder of results, where it is one.
+pub fn solution_file(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join(solution_json::FILE_NAME) } else { path.to_path_buf() }
+}
+
 /// Reads a solution: the file, or that of a folder of results.
 pub fn read_solution(path: &Path) -> Result<SolutionRecord> {
     read_solution_with_bytes(path).map(|(record, _)| record)
@@ -52,8 +57,7 @@ pub fn read_solution(path: &Path) -> Result<SolutionRecord> {
 
 /// As [`read_solution`], with the bytes of the file.
 pub(super) fn read_solution_with_bytes(path: &Path) -> Result<(SolutionRecord, Vec<u8>)> {
-    let within = path.join(solution_json::FILE_NAME);
-    let path = if path.is_dir() { &within } else { path };
+    let path = &solution_file(path);
     recover(path)?;
     let bytes = files::read(path, FileKind::Solution)?;
     let record = solution_json::read(&bytes).map_err(|e| Error {
