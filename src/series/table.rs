@@ -259,7 +259,7 @@ impl Table {
                 let (what, remedy) = match (is_date(cell), cell.contains(',')) {
                     (true, _) => (
                         "is a date or a time",
-                        "write the number anew, and in a spreadsheet format the column as text first: it makes dates of numbers",
+                        "write the number anew (times in seconds); a spreadsheet makes dates of numbers where the column is not text",
                     ),
                     (_, true) => {
                         ("is not a number", "write numbers with a decimal point, and nothing between thousands")
