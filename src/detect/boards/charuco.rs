@@ -170,10 +170,11 @@ impl Found {
         let common = |(at, uv): (_, &[f64; 2])| self.lattice.get(at).map(|own| own == uv);
         let mut common = other.lattice.iter().filter_map(common).peekable();
         let is_same = self.print.legacy == other.print.legacy && common.peek().is_some() && common.all(|same| same);
-        let mut lattice = if is_same { self.lattice.clone() } else { Lattice::new() };
-        let best = if other.explains() >= self.explains() { other } else { self };
-        lattice.extend(&best.lattice);
-        Self { lattice, ..best }
+        let (mut best, rest) = if other.explains() >= self.explains() { (other, self) } else { (self, other) };
+        for (at, uv) in rest.lattice.into_iter().filter(|_| is_same) {
+            best.lattice.entry(at).or_insert(uv);
+        }
+        best
     }
 
     /// Whether the markers alone say which corner is which. On a board with an odd number of squares in a row they fit into both layouts,
