@@ -4,8 +4,8 @@ use super::finding::Finding;
 use super::kind::{CheckContext, Weight};
 use super::left_out::reading_circles::ReadingCircles;
 use super::left_out::{
-    exchanged_pictures, exchanged_readings, left_out_bodies, left_out_images, left_out_observations, many_left_out,
-    moved, shifted_measurements, shifted_readings,
+    exchanged_pictures, exchanged_readings, exchanged_targets, left_out_bodies, left_out_images, left_out_observations,
+    many_left_out, moved, shifted_measurements, shifted_readings,
 };
 use super::steps::{loose, pose_step};
 use super::{
@@ -171,6 +171,7 @@ pub const CHECKS: &[Check] = &[
         explains: |_, other| matches!(other, Finding::ManyLeftOut(_)),
         ..check("left_out_images", Stage::LeftOut(|a, s| found(left_out_images::check(a, s))))
     },
+    check("exchanged_targets", Stage::LeftOut(|a, s| found(exchanged_targets::check(a, s)))),
     check("shifted_measurements", Stage::LeftOut(|a, s| found(shifted_measurements::check(a, s)))),
     check("shifted_readings", Stage::WrongPairs(|a, r, s| found(shifted_readings::check(a, r, s)))),
     check("repeated_measurements", Stage::LeftOut(|a, s| found(repeated_measurements::check(a, s)))),
@@ -222,7 +223,7 @@ pub const CHECKS: &[Check] = &[
 /// the series with such poses; another is loose by itself.
 pub fn follows_from_tool(finding: &Finding, mountings: &[&str]) -> bool {
     match finding {
-        Finding::JointNoiseLarge(_) | Finding::NoGain(_) | Finding::SmallGain(_) => true,
+        Finding::JointNoiseLarge(_) | Finding::NoGain(_) | Finding::SmallGain(_) | Finding::ComputedPostures(_) => true,
         Finding::LooseMounting(loose) => mountings.contains(&loose.mounting.as_str()),
         _ => false,
     }

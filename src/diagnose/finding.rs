@@ -15,6 +15,7 @@ use super::joint_noise::JointNoiseLarge;
 use super::kind::{Kind, Quantity, Subject, Weight};
 use super::left_out::exchanged_pictures::ExchangedPictures;
 use super::left_out::exchanged_readings::ExchangedReadings;
+use super::left_out::exchanged_targets::ExchangedTargets;
 use super::left_out::left_out_bodies::MeasurementsLeftOut;
 use super::left_out::left_out_images::ImagesLeftOut;
 use super::left_out::left_out_observations::ObservationsLeftOut;
@@ -85,6 +86,7 @@ findings! {
     DoubtedSize,
     ExchangedPictures,
     ExchangedReadings,
+    ExchangedTargets,
     Extrapolates,
     FewImages,
     FlangeUndetermined,

@@ -70,6 +70,7 @@ pub use kind::{CheckContext, Quantity, StatedNoise, Subject, Weight};
 pub use left_out::agreement::agreement;
 pub use left_out::exchanged_pictures::ExchangedPictures;
 pub use left_out::exchanged_readings::ExchangedReadings;
+pub use left_out::exchanged_targets::ExchangedTargets;
 pub use left_out::left_out_bodies::MeasurementsLeftOut;
 pub use left_out::left_out_images::ImagesLeftOut;
 pub use left_out::left_out_observations::{ObservationsLeftOut, observations_left_out};

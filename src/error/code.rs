@@ -310,6 +310,7 @@ codes! {
         PoseOutOfReach "pose_out_of_reach" "the nominal robot reaches no such pose",
         JointReadingsWrong "joint_readings_wrong" "the readings of one joint are wrong at some stops",
         PicturesExchanged "pictures_exchanged" "pictures of two cameras stand in the place of each other at some stops",
+        TargetsExchanged "targets_exchanged" "rows of two targets of a tracker stand in the place of each other at some stops",
         ReadingsExchanged "readings_exchanged" "images that were left out fit the readings of each other",
         RowsMisordered "rows_misordered" "with the rows in the other order of the images' names (1, 2, .. 10 or 1, 10, .. 2) the images fit",
         RowsShifted "rows_shifted" "with the rows of joints.csv shifted by one the images fit; of a tracker, all or a part of its rows",

@@ -7,7 +7,7 @@ use robotcal::diagnose::{Carried, Displaced, Finding, Subject, Weight};
 use robotcal::error::Code;
 use robotcal::geom::Pose;
 use robotcal::identify::{Options, RobotModel, Solution, identify};
-use robotcal::problem::{BodySeen, InstrumentKind, MeasuredSeries};
+use robotcal::problem::{BodySeen, InstrumentKind, MeasuredSeries, SeenBody};
 
 use crate::measured_worlds::{Kind, World, chain, readings, stop, truth};
 use crate::support::small::Dice;
@@ -88,6 +88,37 @@ fn single_rows_of_other_stops_are_no_shift() {
         let solution = identified(&world, series).unwrap();
         assert!(found(&solution, Code::RowsShifted).is_none());
         assert_eq!(left_out(&solution), [5, 6, 7, 30, 50]);
+    }
+}
+
+/// Two targets on the tip, at some stops in the rows of each other.
+fn exchanged(world: &World, at: &[usize]) -> MeasuredSeries {
+    let mut series = world.series.clone();
+    series.bodies.clear();
+    for body in &world.series.bodies {
+        let BodySeen::Pose(pose) = body.seen else { panic!("{:?}", body.seen) };
+        let mut points = [Vector3::zeros(), Vector3::new(0.08, -0.05, 0.02)].map(|place| pose.transform(&place));
+        if at.contains(&body.stop) {
+            points.reverse();
+        }
+        let rows = points.into_iter().enumerate();
+        series.bodies.extend(rows.map(|(k, at)| SeenBody {
+            body: format!("target {k}"),
+            seen: BodySeen::Point(at),
+            ..body.clone()
+        }));
+    }
+    series
+}
+
+#[test]
+fn targets_in_the_rows_of_each_other_are_named_with_their_stops() {
+    let world = World::new(76, Kind::Poses, 60, (3e-5, 0.0), 2e-5);
+    for at in [&[7, 21, 22, 40][..], &[33], &[]] {
+        let solution = identified(&world, exchanged(&world, at)).unwrap();
+        let named = found(&solution, Code::TargetsExchanged);
+        assert_eq!(named.map_or_else(Vec::new, Finding::subjects), stops(at), "{:?}", solution.findings);
+        assert_eq!(left_out(&solution).len(), 2 * at.len());
     }
 }
 

@@ -5,6 +5,7 @@
 pub(super) mod agreement;
 pub(super) mod exchanged_pictures;
 pub(super) mod exchanged_readings;
+pub(super) mod exchanged_targets;
 pub(super) mod left_out_bodies;
 pub(super) mod left_out_images;
 pub(super) mod left_out_observations;

@@ -43,6 +43,25 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ShiftedMeas
     all
 }
 
+/// How far a row of an instrument is from where the readings of a stop have what a row beside it measures (or it itself), m + rad.
+pub(super) fn misfit(
+    Adjustment { problem, state }: &Adjustment,
+    row: &BodyMeasurement,
+    (as_of, stop): (&BodyMeasurement, usize),
+) -> Option<f64> {
+    let posture = problem.stops[stop].posture.as_ref()?;
+    let predicted = state.instrument_from_body(as_of, TakenFrom::exact(posture))?;
+    Some(match row.seen {
+        BodySeen::Point(at) => (at - predicted.translation).norm(),
+        BodySeen::Pose(pose) => pose.misfit(&predicted),
+    })
+}
+
+/// True of a row that was left out for not fitting.
+pub(super) const fn is_out(row: &BodyMeasurement) -> bool {
+    matches!(row.rejected, Some(BodyRejection::Residual { .. } | BodyRejection::JointError { .. }))
+}
+
 struct Group<'a> {
     adjustment: &'a Adjustment,
     /// Indices of the measurements in the order of their stops.
@@ -56,13 +75,7 @@ impl Group<'_> {
 
     /// How far a row is from where the readings of a stop have it.
     fn misfit(&self, row: usize, stop: usize) -> Option<f64> {
-        let Adjustment { problem, state } = self.adjustment;
-        let posture = problem.stops[stop].posture.as_ref()?;
-        let seen = state.instrument_from_body(self.measured(row), TakenFrom::exact(posture))?;
-        Some(match self.measured(row).seen {
-            BodySeen::Point(at) => (at - seen.translation).norm(),
-            BodySeen::Pose(pose) => pose.misfit(&seen),
-        })
+        misfit(self.adjustment, self.measured(row), (self.measured(row), stop))
     }
 
     /// The run of rows that were left out and fit those of a neighbour, in one direction and order of the stops.
@@ -107,9 +120,7 @@ impl Group<'_> {
     ) -> Option<f64> {
         let problem = &self.adjustment.problem;
         let measured = self.measured(row);
-        let is_out =
-            matches!(measured.rejected, Some(BodyRejection::Residual { .. } | BodyRejection::JointError { .. }));
-        let other = problem.neighbour(order, measured.stop, below).filter(|_| is_out)?;
+        let other = problem.neighbour(order, measured.stop, below).filter(|_| is_out(measured))?;
         let (own, as_other) = (self.misfit(row, measured.stop)?, self.misfit(row, other)?);
         (as_other < usual + limits.other_readings_explain * own).then_some(as_other)
     }
