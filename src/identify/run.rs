@@ -1,6 +1,7 @@
 //! Identified series to a solution: the steps in their order, and in rounds where a better robot tells postures anew.
 
-use super::controller::computed_postures::{Before, ChosenPostures, told_by_seen};
+use super::controller::choice::Before;
+use super::controller::computed_postures::{ChosenPostures, told_by_seen};
 use super::controller::tool::tool_in_poses;
 use super::estimator::Estimator;
 use super::joint_fit::fit::JointFit;

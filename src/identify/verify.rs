@@ -1,6 +1,7 @@
 //! A robot model judged by a series that it was not fitted to: camera, hand-camera offset and plate are fitted, the robot is not.
 
-use super::controller::computed_postures::{Before, told_by_seen};
+use super::controller::choice::Before;
+use super::controller::computed_postures::told_by_seen;
 use super::joint_fit::unpredicted::nothing_held_out;
 use super::options::JointNoise;
 use super::photogrammetry::free_poses::free_poses_of;

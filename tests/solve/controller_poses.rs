@@ -449,6 +449,26 @@ fn poses_of_a_tool_or_in_a_frame_are_told_from_those_of_the_flange_in_the_base()
     }
 }
 
+/// A tool as long as a hand and turned: what the postures are told to be without it is not what they were.
+#[test]
+fn a_tool_is_told_whatever_postures_were_taken() {
+    let (_, readings, poses) = by_joints();
+    let tool = Pose::from_xyz_rpy([0.02, 0.05, 0.15], [0.3, 0.1, 0.5]);
+    let of_tool: Vec<(String, Pose)> = poses.into_iter().map(|(image, flange)| (image, flange * tool)).collect();
+    let folder = series("quaternion", "qx,qy,qz,qw", &of_tool, quaternion);
+    let inputs = Inputs::read(&urdf(), &[folder.path().to_path_buf()], Ends::default()).unwrap();
+    let options = Options { model: RobotModel::Rigid, ..Options::default() };
+    let calibration = Calibration::of(inputs.observe(&options.limits, &|_, _| ()).unwrap(), &options).unwrap();
+    let solution = calibration.solution();
+    let told = solution.findings.iter().find(|f| matches!(f, Finding::ToolInPoses(_))).unwrap();
+    assert_eq!(told.code(), Code::PosesOfTool, "{told:?}");
+    let off = told.quantities().iter().take(3).zip(tool.xyz()).map(|(q, m)| (q.value - m).powi(2)).sum::<f64>().sqrt();
+    // The turn about the axis of the flange is not told, and takes the place across it along.
+    println!("{} stops, {told:?}", readings.len());
+    assert!(off < 0.06, "{told:?}");
+    assert!(solution.findings.iter().all(|f| f.code() != Code::PosturesByImages), "{:?}", solution.findings);
+}
+
 /// The same pose with the wrist turned over.
 fn turned_over(q: &[f64]) -> Vec<f64> {
     [q[0], q[1], q[2], q[3] - PI * q[3].signum(), -q[4], q[5] - PI * q[5].signum()].to_vec()

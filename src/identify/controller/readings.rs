@@ -2,6 +2,7 @@
 //! of the nominal robot.
 
 use std::collections::BTreeSet;
+use std::f64::consts::PI;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -145,14 +146,33 @@ fn misread(way: ReadAs, poses: &ControllerPoses, place: String, fit: &str) -> Op
 const SEEN_FITS: &str = "what was seen at the stops fits";
 
 /// An arm whose postures are looked for.
-struct Arm {
+pub(super) struct Arm {
     robot: Robot,
     limits: Vec<(f64, f64)>,
 }
 
 impl Arm {
-    fn of(chain: &Chain) -> Self {
+    pub fn of(chain: &Chain) -> Self {
         Self { limits: reading_limits(chain), robot: Robot::nominal(chain.clone()) }
+    }
+
+    /// Whose joints turn all round at least.
+    pub fn beyond_limits(chain: &Chain) -> Self {
+        let all = reading_limits(chain).into_iter().zip(&chain.reading_kinds);
+        let wide = |((low, high), kind): ((f64, f64), &JointKind)| match is_angle(*kind) {
+            true => (low.min(-PI), high.max(PI)),
+            false => (low, high),
+        };
+        Self { limits: all.map(wide).collect(), robot: Robot::nominal(chain.clone()) }
+    }
+
+    /// Readings that reach a pose, looked for from some; `None` where they do not lead there.
+    pub fn reading_near(&self, pose: &Pose, from: &[f64]) -> Option<Vec<f64>> {
+        solve_from(&self.robot, &self.limits, pose, from)
+    }
+
+    pub fn tip(&self, readings: &[f64]) -> Pose {
+        self.robot.base_from_tip(readings)
     }
 
     fn postures(&self, series: &Series, poses: &ControllerPoses, told: &PosesFit) -> Result<Vec<Option<Vec<f64>>>> {
@@ -303,7 +323,7 @@ impl Arm {
     }
 
     /// Other postures that reach the pose of some readings; none where they are without number.
-    fn others(&self, pose: &Pose, readings: &[f64]) -> Vec<Vec<f64>> {
+    pub fn others(&self, pose: &Pose, readings: &[f64]) -> Vec<Vec<f64>> {
         let kinds = &self.robot.chain.reading_kinds;
         let mut all = vec![readings.to_vec()];
         for found in self.postures_of(pose).into_iter().map(|q| self.turned(q, readings)) {
@@ -311,6 +331,15 @@ impl Arm {
         }
         let others = all.split_off(1);
         if others.len() > MOST_POSTURES { Vec::new() } else { others }
+    }
+
+    /// Postures other than some readings that reach a pose, looked for from those of another one.
+    pub fn reached_from(&self, postures: &[Vec<f64>], pose: &Pose, readings: &[f64]) -> Vec<Vec<f64>> {
+        let mut all = vec![readings.to_vec()];
+        for found in postures.iter().filter_map(|from| self.reading_near(pose, from)) {
+            FullTurns::Alike.add(self.turned(found, readings), &mut all, &self.robot.chain.reading_kinds);
+        }
+        all.split_off(1)
     }
 
     /// How many of some of the poses can be reached.

@@ -9,26 +9,36 @@
 //! ```
 //!
 //! with `G_i`, `e_i`, `x` as in `computed_postures`; `c` is minimised by Levenberg-Marquardt, `x` eliminated (G. Golub and V. Pereyra 1973).
+//!
+//! The postures that were told without a tool may be wrong with one. So the search starts from them and from all in which the stops are alike, which
+//! is how robots are driven; and where a tool gains, every stop takes the posture that all others predict best with it, in turns.
 
 use nalgebra::{DMatrix, DVector, Matrix6, SymmetricEigen, Vector3, Vector6};
 use rayon::prelude::*;
 
-use super::computed_postures::{Compared, Knowledge, SeenAt};
+use super::choice::{Candidate, Knowledge, Stop, Stops};
+use super::compared::{Compared, SeenAt};
+use super::readings::Arm;
 use crate::assess::Limits;
 use crate::diagnose::{PosesOf, ToolInPoses};
 use crate::error::Result;
 use crate::geom::{Pose, exp_so3};
-use crate::model::inverse::{reading_limits, solve_from};
 use crate::model::robot::Robot;
 use crate::problem::{Adjustment, MeasuredSeries, State};
 use crate::series::{CameraMount, spread};
 
 /// Stops that are compared, at most.
-const MOST_STOPS: usize = 100;
+const MOST_STOPS: usize = 40;
 /// Lengths of tools along the axis of the flange from which the search starts, m.
 const STARTS_M: [f64; 3] = [0.0, 0.15, -0.15];
 /// Most steps of the search.
 const STEPS: usize = 12;
+/// Rounds in which the stops settle on one family of postures.
+const FAMILY_ROUNDS: usize = 4;
+/// The best tools, with which postures are looked for all over the joint ranges.
+const RECHOSEN: usize = 3;
+/// Most times that postures are chosen anew.
+const RECHOICES: usize = 4;
 /// Step of numerical derivatives, m and rad.
 const DIFFERENCE: f64 = 2e-3;
 /// Damping beyond which no step gains anything.
@@ -54,21 +64,46 @@ pub(in crate::identify) fn tool_in_poses(
     Some(ToolInPoses { series: names, of, place_m: place_m.into(), sigma_m: sigma_m.into(), gain })
 }
 
+/// A stop as images saw it.
+#[derive(Clone)]
+struct PosedStop {
+    seen: SeenAt,
+    /// Readings that reach the pose that was stated; first those that were taken.
+    postures: Vec<Vec<f64>>,
+    stated: Pose,
+}
+
 struct Search<'a> {
     compared: &'a Compared,
     of: PosesOf,
-    nominal: Robot,
-    limits: Vec<(f64, f64)>,
-    /// The stops that are compared as images saw them, the readings that were taken, and the pose that was stated.
-    stops: Vec<(SeenAt, Vec<f64>, Pose)>,
+    arm: Arm,
+    /// The stops that are compared.
+    stops: Vec<PosedStop>,
     equations: usize,
+    /// Every coordinate of a stop that is out of reach.
+    unreached: f64,
+}
+
+/// What a stop says with a tool or a frame.
+struct StopWith {
+    readings: Vec<f64>,
+    /// `V^-1/2 G` and `V^-1/2 e`.
+    g: DMatrix<f64>,
+    e: DVector<f64>,
+    is_reached: bool,
+}
+
+impl StopWith {
+    fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
+        &self.e - &self.g * x
+    }
 }
 
 /// A tool or a frame, and what the stops say with it.
 struct Tried {
     /// m, and rad as a rotation vector.
     tool: Vector6<f64>,
-    stops: Vec<(DMatrix<f64>, DVector<f64>)>,
+    stops: Vec<StopWith>,
     known: Knowledge,
     x: DVector<f64>,
     cost: f64,
@@ -79,9 +114,42 @@ fn pose(tool: &Vector6<f64>) -> Pose {
     Pose::new(exp_so3(&turn), tool.fixed_rows::<3>(0).into_owned())
 }
 
+/// Other postures of a stop that reach a pose of the flange than its readings.
+trait Others: Fn(&PosedStop, &Pose, &[f64]) -> Vec<Vec<f64>> + Sync {}
+impl<F: Fn(&PosedStop, &Pose, &[f64]) -> Vec<Vec<f64>> + Sync> Others for F {}
+
+/// Sum of squares of the differences of readings.
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
+}
+
+/// Readings of all stops near to each other: one for every posture of the stop that has most, as far as they differ.
+fn families(stops: &[PosedStop]) -> Vec<Vec<Vec<f64>>> {
+    let Some(anchor) = stops.iter().max_by_key(|stop| stop.postures.len()) else { return Vec::new() };
+    let nearest = |to: &[f64]| {
+        let of = |stop: &PosedStop| {
+            stop.postures.iter().min_by(|a, b| apart(a, to).total_cmp(&apart(b, to))).cloned().unwrap_or_default()
+        };
+        stops.iter().map(of).collect::<Vec<_>>()
+    };
+    let mut all: Vec<Vec<Vec<f64>>> = Vec::new();
+    for posture in &anchor.postures {
+        let mut family = nearest(posture);
+        for _ in 0..FAMILY_ROUNDS {
+            let mean = |k: usize| family.iter().map(|q| q[k]).sum::<f64>() / family.len() as f64;
+            family = nearest(&(0..posture.len()).map(mean).collect::<Vec<_>>());
+        }
+        if !all.contains(&family) {
+            all.push(family);
+        }
+    }
+    all
+}
+
 impl<'a> Search<'a> {
     fn new(compared: &'a Compared, series: &[MeasuredSeries], robot: &Robot, of: PosesOf) -> Option<Self> {
-        let nominal = Robot::nominal(robot.chain.clone());
+        // With another tool the robot may have been where its limits do not let it with this one.
+        let arm = Arm::beyond_limits(&robot.chain);
         let problem = &compared.adjustment.problem;
         let taken = |seen: &SeenAt| {
             let seen = seen.by_images()?;
@@ -89,22 +157,24 @@ impl<'a> Search<'a> {
             if !series[first.series].readings_are_computed() {
                 return None;
             }
-            let posture = problem.stops[first.stop].posture.as_ref()?;
-            let stated = nominal.base_from_tip(&posture.readings);
-            Some((seen, posture.readings.clone(), stated))
+            let taken = problem.stops[first.stop].posture.as_ref()?.readings.clone();
+            Some((seen, arm.tip(&taken), taken))
         };
         let all: Vec<_> = compared.stops.iter().filter_map(taken).collect();
-        let stops: Vec<_> = spread(all.len(), MOST_STOPS).map(|k| all[k].clone()).collect();
-        let equations = stops.iter().map(|(seen, ..)| 6 * seen.images.len()).sum();
-        let limits = reading_limits(&robot.chain);
-        (!stops.is_empty()).then_some(Self { compared, of, nominal, limits, stops, equations })
+        let posed = |k: usize| {
+            let (seen, stated, taken) = all[k].clone();
+            PosedStop { seen, stated, postures: vec![taken] }
+        };
+        let stops: Vec<PosedStop> = spread(all.len(), MOST_STOPS).map(posed).collect();
+        let equations = stops.iter().map(|stop| 6 * stop.seen.images.len()).sum();
+        (!stops.is_empty()).then_some(Self { compared, of, arm, stops, equations, unreached: 0.0 })
     }
 
     /// What the flange carries stands as it was on the tool, what is fixed as it was in the frame.
     fn state(&self, of: &Pose) -> State {
         let Adjustment { problem, state } = &self.compared.adjustment;
         let mut moved = state.clone();
-        for image in self.stops.iter().flat_map(|(seen, ..)| &seen.images).map(|i| &problem.images[*i]) {
+        for image in self.stops.iter().flat_map(|stop| &stop.seen.images).map(|i| &problem.images[*i]) {
             let moves_camera = (image.mount == CameraMount::Hand) == (self.of == PosesOf::Tool);
             match moves_camera {
                 true => moved.mountings[image.mounting] = *of * state.mountings[image.mounting],
@@ -114,61 +184,146 @@ impl<'a> Search<'a> {
         moved
     }
 
-    /// `None` where a stop is out of reach with this tool or frame.
-    fn stops_with(&self, tool: &Vector6<f64>) -> Option<Vec<(DMatrix<f64>, DVector<f64>)>> {
+    /// The pose of the flange where one was stated for a tool, or in a frame.
+    fn flange(&self, of: &Pose, stated: &Pose) -> Pose {
+        match self.of {
+            PosesOf::Tool => *stated * of.inverse(),
+            PosesOf::Frame => *of * *stated,
+        }
+    }
+
+    /// All stops, with readings near to those `from` which they are looked for.
+    fn stops_with<'r>(&self, tool: &Vector6<f64>, from: impl Fn(usize) -> &'r [f64] + Sync) -> Option<Vec<StopWith>> {
         let of = pose(tool);
         let state = self.state(&of);
         let origins = state.robot.linear_origins();
-        let without = of.inverse();
-        let one = |(seen, taken, stated): &(SeenAt, Vec<f64>, Pose)| {
-            let flange = match self.of {
-                PosesOf::Tool => *stated * without,
-                PosesOf::Frame => of * *stated,
+        let one = |(k, stop): (usize, &PosedStop)| {
+            let found = self.arm.reading_near(&self.flange(&of, &stop.stated), from(k));
+            let Some(readings) = found else {
+                let rows = 6 * stop.seen.images.len();
+                let g = DMatrix::zeros(rows, self.compared.prior.len());
+                let e = DVector::from_element(rows, self.unreached);
+                return Some(StopWith { readings: from(k).to_vec(), g, e, is_reached: false });
             };
-            let readings = solve_from(&self.nominal, &self.limits, &flange, taken)?;
-            self.compared.seen_at((&state, &origins), seen, &readings)
+            let (g, e) = self.compared.seen_at((&state, &origins), &stop.seen, &readings)?;
+            Some(StopWith { readings, g, e, is_reached: true })
         };
-        self.stops.par_iter().map(one).collect()
+        self.stops.par_iter().enumerate().map(one).collect()
     }
 
     /// The best one, with the sigma of its place (m) and the gain of the log likelihood, if it is told.
-    fn told(&self, limits: &Limits) -> Option<(PosesOf, Tried, Vector3<f64>, f64)> {
-        let none = self.at(Vector6::zeros())?;
-        let starts = STARTS_M.map(|z| Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0));
-        let found: Vec<Tried> = starts.into_par_iter().filter_map(|start| self.least(self.at(start)?)).collect();
-        let best = found.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    fn told(mut self, limits: &Limits) -> Option<(PosesOf, Tried, Vector3<f64>, f64)> {
+        let taken: Vec<Vec<f64>> = self.stops.iter().map(|stop| stop.postures[0].clone()).collect();
+        let none = self.at(Vector6::zeros(), |k| &taken[k])?;
+        // Out of reach is worse than a stop usually is without a tool.
+        self.unreached = (2.0 * none.cost / self.equations as f64).sqrt();
+        // Where stops fit as they are, nothing is to be told.
+        if none.cost < self.equations as f64 {
+            return None;
+        }
+        let best = self.best(taken)?;
         let gain = 0.5 * self.equations as f64 * (none.cost / best.cost).ln();
+        tracing::debug!(of = ?self.of, gain, at = ?best.tool.as_slice(), "tool in poses");
         let sigma_m = self.sigma_m(&best)?;
         let far_m = best.tool.fixed_rows::<3>(0).norm();
         let is_told = gain > limits.tool_log_odds && far_m > limits.tool_sigmas * sigma_m.norm();
         is_told.then_some((self.of, best, sigma_m, gain))
     }
 
-    fn at(&self, tool: Vector6<f64>) -> Option<Tried> {
-        let stops = self.stops_with(&tool)?;
+    /// The best one, from all starts with the readings that were `taken`, and from all families of postures.
+    fn best(&mut self, taken: Vec<Vec<f64>>) -> Option<Tried> {
+        let Self { stops, arm, .. } = self;
+        stops.par_iter_mut().for_each(|stop| {
+            let others = arm.others(&stop.stated, &stop.postures[0]);
+            stop.postures.extend(others);
+        });
+        let along = STARTS_M.map(|z| (Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0), taken.clone()));
+        let of_families = families(&self.stops).into_iter().map(|family| (Vector6::zeros(), family));
+        let starts: Vec<_> = along.into_iter().chain(of_families).collect();
+        let from_known =
+            |stop: &PosedStop, flange: &Pose, own: &[f64]| self.arm.reached_from(&stop.postures, flange, own);
+        let settled = |(tool, readings): (Vector6<f64>, Vec<Vec<f64>>)| {
+            let least = self.least(self.at(tool, |k| &readings[k])?)?;
+            Some(self.settled(least, from_known))
+        };
+        let mut found: Vec<Tried> = starts.into_par_iter().filter_map(settled).collect();
+        found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        found.truncate(RECHOSEN);
+        let from_all = |_: &PosedStop, flange: &Pose, own: &[f64]| self.arm.others(flange, own);
+        let found = found.into_iter().map(|tried| self.settled(tried, from_all));
+        found.min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    /// With the postures that all stops predict best of each other, of those that `others` gives, and the best tool with them, in turns.
+    fn settled(&self, mut tried: Tried, others: impl Others) -> Tried {
+        for _ in 0..RECHOICES {
+            let next =
+                self.rechosen(&tried, &others).and_then(|readings| self.least(self.at(tried.tool, |k| &readings[k])?));
+            match next.filter(|next| next.cost < tried.cost) {
+                Some(next) => tried = next,
+                None => break,
+            }
+        }
+        tried
+    }
+
+    /// Readings in other postures, some of them, with the same tool; `None` where all stay.
+    fn rechosen(&self, tried: &Tried, others: &impl Others) -> Option<Vec<Vec<f64>>> {
+        let of = pose(&tried.tool);
+        let state = self.state(&of);
+        let origins = state.robot.linear_origins();
+        let one = |(stop, own): (&PosedStop, &StopWith)| {
+            let flange = self.flange(&of, &stop.stated);
+            let others = others(stop, &flange, &own.readings);
+            let other = |readings: Vec<f64>| {
+                let (g, e) = self.compared.seen_at((&state, &origins), &stop.seen, &readings)?;
+                Some(Candidate { readings, g, e })
+            };
+            let own = Candidate { readings: own.readings.clone(), g: own.g.clone(), e: own.e.clone() };
+            let all: Option<Vec<_>> = std::iter::once(Some(own)).chain(others.into_iter().map(other)).collect();
+            all.map(Stop::of)
+        };
+        let all: Option<Vec<Stop>> = self.stops.par_iter().zip(&tried.stops).map(one).collect();
+        let stops = Stops { all: all?, prior: self.compared.prior.clone() };
+        let chosen = stops.descended(vec![0; stops.all.len()])?.postures;
+        let of_choice = stops.all.iter().zip(&chosen).map(|(stop, &c)| stop.candidates[c].readings.clone());
+        chosen.iter().any(|&c| c > 0).then(|| of_choice.collect())
+    }
+
+    /// A tool or a frame, with readings near to those `from` which they are looked for.
+    fn at<'r>(&self, tool: Vector6<f64>, from: impl Fn(usize) -> &'r [f64] + Sync) -> Option<Tried> {
+        let stops = self.stops_with(&tool, from)?;
         let mut known = Knowledge::of_priors(&self.compared.prior);
-        stops.iter().for_each(|(g, e)| known.add((g, e), 1.0));
+        stops.iter().for_each(|stop| known.add((&stop.g, &stop.e), 1.0));
         let x = known.factor()?.solve(&known.rhs);
         let cost = known.squares - known.rhs.dot(&x);
         Some(Tried { tool, stops, known, x, cost })
     }
 
+    /// Residuals of all stops with a tool or frame beside the one that was tried; those that either does not reach as they were there.
+    fn residuals_beside(&self, tried: &Tried, tool: &Vector6<f64>) -> Option<Vec<f64>> {
+        let moved = self.stops_with(tool, |k| &tried.stops[k].readings)?;
+        let of = |(moved, own): (&StopWith, &StopWith)| {
+            let both = moved.is_reached && own.is_reached;
+            if both { moved.residual(&tried.x) } else { own.residual(&tried.x) }.data.as_vec().clone()
+        };
+        Some(moved.iter().zip(&tried.stops).flat_map(of).collect())
+    }
+
     /// Normal equations of the tool with `x` eliminated: information, and the gradient.
     fn reduced(&self, tried: &Tried) -> Option<(Matrix6<f64>, Vector6<f64>)> {
-        let residuals = |stops: &[(DMatrix<f64>, DVector<f64>)]| {
-            let all: Vec<f64> = stops.iter().flat_map(|(g, e)| (e - g * &tried.x).data.as_vec().clone()).collect();
-            DVector::from_vec(all)
-        };
-        let r = residuals(&tried.stops);
+        let own = tried.stops.iter().flat_map(|stop| stop.residual(&tried.x).data.as_vec().clone());
+        let r = DVector::from_vec(own.collect());
         let mut j = DMatrix::zeros(r.len(), 6);
         for k in 0..6 {
             let mut moved = tried.tool;
             moved[k] += DIFFERENCE;
-            j.set_column(k, &((residuals(&self.stops_with(&moved)?) - &r) / DIFFERENCE));
+            let beside = DVector::from_vec(self.residuals_beside(tried, &moved)?);
+            j.set_column(k, &((beside - &r) / DIFFERENCE));
         }
         let mut coupled = DMatrix::zeros(tried.x.len(), 6);
         let mut row = 0;
-        for (g, _) in &tried.stops {
+        for StopWith { g, .. } in &tried.stops {
             coupled.gemm_tr(1.0, g, &j.rows(row, g.nrows()), 1.0);
             row += g.nrows();
         }
@@ -188,7 +343,7 @@ impl<'a> Search<'a> {
             while damping < MOST_DAMPING {
                 let damped = information + Matrix6::from_diagonal(&information.diagonal().map(|d| damping * d + 1.0));
                 let step = damped.cholesky()?.solve(&-gradient);
-                match self.at(tried.tool + step).filter(|next| next.cost < tried.cost) {
+                match self.at(tried.tool + step, |k| &tried.stops[k].readings).filter(|next| next.cost < tried.cost) {
                     Some(next) => {
                         gained = 1.0 - next.cost / tried.cost;
                         tried = next;
