@@ -47,7 +47,7 @@ pub use solution::{photogrammetry, restore, solution_json};
 #[cfg(feature = "mcap")]
 pub use vision::recording;
 pub use vision::{detection_files, poses_record};
-pub use write::{NewFolder, NewResult, ResultFolder, recover, write_all, write_beside};
+pub use write::{NewFolder, NewResult, ResultFolder, is_changed, recover, write_all, write_beside};
 
 use std::collections::BTreeMap;
 

@@ -205,6 +205,21 @@ fn a_folder_of_results_stands_for_its_solution() {
 }
 
 #[test]
+fn a_solution_that_somebody_changed_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["solution.json", ".robotcal-written.json"] {
+        std::fs::copy(root(&format!("reports/kr6_small/{name}")), folder.path().join(name)).unwrap();
+    }
+    let solution = folder.path().join("solution.json");
+    let shown = || text(&robotcal(&["show", solution.to_str().unwrap()]));
+    let code = Code::SolutionDamaged.to_string();
+    assert!(!shown().contains(&code), "{}", shown());
+    let written = std::fs::read_to_string(&solution).unwrap();
+    std::fs::write(&solution, written.replacen('0', "1", 1)).unwrap();
+    assert_says(&shown(), Code::SolutionDamaged, &[solution.to_str().unwrap()]);
+}
+
+#[test]
 fn what_is_no_series_is_said_to_be_none() {
     let urdf = root(KR6);
     for [robot, series] in [[&root("datasets/kr6_small"), &urdf], [&urdf, &root("datasets")]] {

@@ -9,12 +9,12 @@ use super::{long_table, summary};
 use crate::cli::Verdict;
 use crate::cli::terminal::say::{say, say_line};
 use crate::cli::terminal::stages;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Notice, Result};
 use crate::files::{self, FileKind};
 use crate::output::difference::{Difference, compare_solutions};
 use crate::output::solution_json::{self, SolutionRecord};
 use crate::output::verdict;
-use crate::output::{REPORT, ResultFolder, Thumbnails, figure_files, recover, report_html};
+use crate::output::{REPORT, ResultFolder, Thumbnails, figure_files, is_changed, recover, report_html};
 use crate::urdf::JointKind;
 
 /// Flags of `show`.
@@ -64,7 +64,17 @@ pub(super) fn read_solution_with_bytes(path: &Path) -> Result<(SolutionRecord, V
         place: e.place.replacen(solution_json::FILE_NAME, &path.display().to_string(), 1),
         ..e
     })?;
+    if is_changed(path, &bytes) {
+        tracing::warn!("{}", changed(path).coded());
+    }
     Ok((record, bytes))
+}
+
+fn changed(path: &Path) -> Notice {
+    let what =
+        "is not as robotcal wrote it: somebody changed it since, and nothing that follows from it is known to be right";
+    let remedy = "run identify again, or take the file from a copy of the result";
+    Notice::new(Code::SolutionDamaged, path.display(), what, remedy)
 }
 
 pub fn run(args: &ShowArgs) -> Result<Verdict> {

@@ -16,6 +16,7 @@ mod swap;
 mod tree;
 
 pub use new_result::{NewFolder, NewResult};
+pub use own::is_changed;
 pub use place::ResultFolder;
 pub use strays::recover;
 

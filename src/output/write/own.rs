@@ -72,6 +72,13 @@ pub(super) fn standing(folder: &Path, name: &str, files: &[(String, &[u8])]) -> 
     }
 }
 
+/// True of a file that is not as it was written to its folder; false where no record says.
+pub fn is_changed(path: &Path, bytes: &[u8]) -> bool {
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let recorded = path.parent().and_then(|folder| written(folder).remove(&name));
+    recorded.is_some_and(|hash| hash != sha256(bytes))
+}
+
 /// Hashes of what was written to a folder, by name; none where it has no record.
 pub(super) fn written(folder: &Path) -> BTreeMap<String, String> {
     fs::read(folder.join(WRITTEN)).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
