@@ -46,6 +46,25 @@ impl OrientedBox {
         at(0.5 * (low + high)).min(at(0.0)).min(at(1.0))
     }
 
+    /// True where the segment from `a` to `b` passes through the box, or ends in it (T. Kay and J. Kajiya 1986).
+    pub fn is_cut_by(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> bool {
+        let box_from_frame = self.pose.inverse();
+        let [a, b] = [a, b].map(|x| box_from_frame.transform(x));
+        let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
+        for ((a, b), half) in a.iter().zip(&b).zip(&self.half_m) {
+            let along = b - a;
+            if along == 0.0 {
+                if a.abs() > *half {
+                    return false;
+                }
+                continue;
+            }
+            let (s, t) = ((-half - a) / along, (half - a) / along);
+            (enters, leaves) = (enters.max(s.min(t)), leaves.min(s.max(t)));
+        }
+        enters <= leaves
+    }
+
     /// The eight corners.
     pub fn corners(&self) -> [Vector3<f64>; 8] {
         std::array::from_fn(|k| {
@@ -107,6 +126,7 @@ mod tests {
             let nearest = sampled(2000, |t| around.distance_m(&(a + (b - a) * t)));
             let found = around.distance_to_segment_m(&a, &b);
             assert!((found - nearest).abs() < 3e-3, "{k}: {found} {nearest}");
+            assert_eq!(around.is_cut_by(&a, &b), found == 0.0, "{k}: {found}");
         }
     }
 }

@@ -74,6 +74,8 @@ pub struct CandidateCounts {
     pub out_of_reach: usize,
     /// Joint vectors that collide.
     pub colliding: usize,
+    /// Joint vectors at which something stands between the camera and the plate.
+    pub hidden: usize,
 }
 
 impl CandidateCounts {
@@ -84,6 +86,7 @@ impl CandidateCounts {
         self.most_markers = self.most_markers.max(other.most_markers);
         self.out_of_reach += other.out_of_reach;
         self.colliding += other.colliding;
+        self.hidden += other.hidden;
     }
 }
 
@@ -217,15 +220,28 @@ impl<'a> Search<'a> {
         let before = solutions.len();
         solutions.retain(|q| scene.collision(q, placement).is_none());
         tally.colliding = before - solutions.len();
+        let free = solutions.len();
         let made = solutions.into_iter().map(|readings| Candidate {
+            seen: self.unhidden(&readings, (placement, &plate_from_camera), &seen),
             posture: posture(&readings, limits),
             readings,
             placement,
             view,
             camera_from_plate,
-            seen: seen.clone(),
         });
-        (made.collect(), tally)
+        let made = made.filter(|c| options.sight.allow(&setting.plate, &camera_from_plate, &c.seen));
+        let made: Vec<Candidate> = made.collect();
+        tally.hidden = free - made.len();
+        (made, tally)
+    }
+
+    /// Those of the markers (indices) before which nothing stands at these readings.
+    fn unhidden(&self, readings: &[f64], (placement, plate_from_camera): (usize, &Pose), seen: &[usize]) -> Vec<usize> {
+        let Self { setting, scene, .. } = self;
+        let base_from_plate = setting.base_from_plate(plate_from_camera, placement);
+        let in_sight = scene.in_sight(readings, base_from_plate.transform(&plate_from_camera.translation));
+        let place = |k: usize| base_from_plate.transform(&setting.plate.markers[k].position_m);
+        seen.iter().copied().filter(|&k| !in_sight.hides(&place(k))).collect()
     }
 }
 
@@ -262,6 +278,9 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
     }
     if tally.out_of_reach + tally.unseen == tally.views {
         return out_of_reach(setting, options, tally.out_of_reach);
+    }
+    if tally.hidden > tally.colliding {
+        return all_hidden(tally.hidden);
     }
     all_collide(setting, scene, options, tally.colliding)
 }
@@ -348,6 +367,15 @@ fn all_collide(setting: &Setting, scene: &Scene, options: &CandidateOptions, pos
     let remedy = "check boxes and table (--box, --table-z-m), allow less clearance (--clearance-mm) or thinner links \
                   (--link-radius-mm), or put the plate elsewhere";
     Error::new(Code::PlanCollides, "plan: collisions", what, remedy)
+}
+
+/// In every posture that reaches a workable view something stands before the plate.
+fn all_hidden(postures: usize) -> Error {
+    let what = format!(
+        "in {postures} postures that reach a workable view and touch nothing, a box or the arm hides the plate from the camera"
+    );
+    let remedy = "check the boxes (--box) and where plate and camera are (--plate-pose, --hand-camera), or ask for fewer markers (--markers)";
+    Error::new(Code::PlanViewless, "plan: sight", what, remedy)
 }
 
 /// Random postures over the joint ranges that touch nothing: the workspace over which accuracy is meant.

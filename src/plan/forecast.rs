@@ -130,7 +130,7 @@ impl Choice {
     /// A candidate as a stop with this image; `None` where it sees no marker.
     pub(super) fn stop(&self, setting: &Setting, candidate: usize, image: &str) -> Option<PlannedStop> {
         let c = &self.pool[candidate];
-        setting.stop(&self.adjustment.state, image, &c.readings, c.placement)
+        setting.stop_seeing(&self.adjustment.state, image, (&c.readings, c.placement, &c.seen))
     }
 }
 

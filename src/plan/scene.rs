@@ -86,6 +86,24 @@ pub struct Scene {
     clearance_m: f64,
 }
 
+/// What may hide something from an eye, in the base frame.
+#[derive(Debug)]
+pub struct InSight {
+    eye_m: Vector3<f64>,
+    boxes: Vec<OrientedBox>,
+    /// Ends and radius, m.
+    links: Vec<([Vector3<f64>; 2], f64)>,
+}
+
+impl InSight {
+    /// True where something stands before a point of the base frame, m.
+    pub fn hides(&self, point_m: &Vector3<f64>) -> bool {
+        let sight = [&self.eye_m, point_m];
+        self.boxes.iter().any(|b| b.is_cut_by(sight[0], sight[1]))
+            || self.links.iter().any(|(ends, radius_m)| segment_distance_m(sight, [&ends[0], &ends[1]]) < *radius_m)
+    }
+}
+
 /// The link above a base that joints carry and the arm.
 #[derive(Debug, Clone, Copy)]
 struct Cell {
@@ -266,6 +284,21 @@ impl Scene {
         }
         let carried = self.plates_in_hand.get(placement)?.placed(&(still_from_base * *links.last()?));
         self.plate_in_hand_collides(&carried, &ends, table)
+    }
+
+    /// What may stand between an eye and what it looks at, at these readings: boxes, and the links but the two that carry camera or plate.
+    pub fn in_sight(&self, readings: &[f64], eye_m: Vector3<f64>) -> InSight {
+        let links = self.robot.link_poses(readings);
+        let base_from_still = self.cell.map_or_else(Pose::identity, |cell| links[cell.entry]);
+        // What the eye is in is the camera.
+        let boxes = self.boxes.iter().map(|(_, b)| b.placed(&base_from_still)).filter(|b| b.distance_m(&eye_m) > 0.0);
+        let last = self.capsules.iter().map(|c| c.order).max().unwrap_or(0);
+        let carried = self.capsules.iter().filter(|c| c.order + 1 < last);
+        let placed = |c: &Capsule| (c.ends_m.map(|e| c.joint.map_or(e, |j| links[j].transform(&e))), c.radius_m);
+        let is_apart = |(ends, radius_m): &([Vector3<f64>; 2], f64)| {
+            segment_distance_m([&eye_m, &eye_m], [&ends[0], &ends[1]]) > *radius_m
+        };
+        InSight { eye_m, boxes: boxes.collect(), links: carried.map(placed).filter(is_apart).collect() }
     }
 
     /// The table or the box that a carried body comes too near to.

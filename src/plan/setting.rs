@@ -158,6 +158,14 @@ impl Setting {
         self.mount.camera_from_plate(&self.mounting, &tip, &self.placements[placement].1)
     }
 
+    /// `base_from_plate` for a view `plate_from_camera`.
+    pub fn base_from_plate(&self, plate_from_camera: &Pose, placement: usize) -> Pose {
+        match self.mount {
+            CameraMount::Hand => self.placements[placement].1,
+            CameraMount::Fixed => self.mounting * plate_from_camera.inverse(),
+        }
+    }
+
     /// `base_from_tip` for a view `plate_from_camera`.
     pub fn base_from_tip(&self, plate_from_camera: &Pose, placement: usize) -> Pose {
         let plate = &self.placements[placement].1;
@@ -170,7 +178,12 @@ impl Setting {
     /// The stop with the image that would be taken: every marker seen, observed where it is predicted. `None` where nothing is seen.
     pub fn stop(&self, state: &State, name: &str, readings: &[f64], placement: usize) -> Option<PlannedStop> {
         let seen = seen_markers(&self.plate, &self.camera, &self.camera_from_plate(readings, placement));
-        self.stop_of(state, name, (readings, placement, &seen), |marker| {
+        self.stop_seeing(state, name, (readings, placement, &seen))
+    }
+
+    /// The same, where the markers that are seen are known by their indices.
+    pub fn stop_seeing(&self, state: &State, name: &str, stop: (&[f64], usize, &[usize])) -> Option<PlannedStop> {
+        self.stop_of(state, name, stop, |marker| {
             let inner = Some((Edge::Inner, marker.inner_radius_m, 1.0)).filter(|(_, radius_m, _)| *radius_m > 0.0);
             iter::once((Edge::Outer, marker.outer_radius_m, 1.0)).chain(inner)
         })

@@ -231,6 +231,38 @@ fn every_planned_pose_is_inside_limits_sees_enough_and_touches_nothing() {
     }
 }
 
+/// A guard beside the plate, higher than the camera looks from: no line of sight to a marker that is planned for goes through it.
+#[test]
+fn nothing_stands_between_the_camera_and_the_markers_of_a_planned_pose() {
+    let mut request = request("kuka_kr6_r900", 12);
+    request.setting.placements.truncate(1);
+    let (name, plate) = request.setting.placements[0].clone();
+    let guard = Pose::from_xyz_rpy([0.22, 0.0, 0.15], [0.0; 3]);
+    let guard = OrientedBox { pose: plate * guard, half_m: Vector3::new(0.03, 0.2, 0.15) };
+    let through = |plan: &Plan, request: &PlanRequest| {
+        let mut hidden = 0;
+        for leg in &plan.legs {
+            let candidate = &plan.pool[leg.stop];
+            let eye = plate.transform(&candidate.camera_from_plate.inverse().translation);
+            let markers = candidate.seen.iter().map(|k| plate.transform(&request.setting.plate.markers[*k].position_m));
+            hidden += markers.filter(|m| guard.distance_to_segment_m(&eye, m) < 1e-6).count();
+        }
+        hidden
+    };
+    request.budget.most_per_placement = None;
+    let open = plan(&request).unwrap();
+    request.scene.boxes = vec![guard];
+    let guarded = plan(&request).unwrap();
+    println!("{name}: {} lines of sight, {} with the guard", through(&open, &request), through(&guarded, &request));
+    assert!(through(&open, &request) > 0);
+    assert_eq!(through(&guarded, &request), 0);
+    assert!(guarded.legs.iter().all(|leg| guarded.pool[leg.stop].seen.len() >= request.candidates.sight.least_markers));
+    // A lid over the plate hides it from everywhere.
+    let lid = Pose::from_xyz_rpy([0.0, 0.0, 0.05], [0.0; 3]);
+    request.scene.boxes = vec![OrientedBox { pose: plate * lid, half_m: Vector3::new(0.3, 0.3, 0.005) }];
+    assert_eq!(plan(&request).map(|_| ()).unwrap_err().code, Code::PlanViewless);
+}
+
 /// A plate from 0.15 m to far behind its middle: no lens is sharp there, unless it is said to be.
 #[test]
 fn views_that_no_lens_holds_sharp_are_named_where_nothing_is_said_of_it() {
