@@ -78,13 +78,10 @@ pub(super) fn start(robot: &KnownRobot, touches: &Touches, columns: &Columns, gi
 }
 
 /// Points of the bodies in the tip, the work object, and the places that are not known, in the base.
-fn located(
-    robot: &KnownRobot,
-    tips: &[Pose],
-    touches: &Touches,
-    columns: &Columns,
-    given: &Given,
-) -> Option<(Vec<Vector3<f64>>, Pose, Vec<Vector3<f64>>)> {
+type Located = (Vec<Vector3<f64>>, Pose, Vec<Vector3<f64>>);
+
+/// By what is given of them, as far as it is.
+fn located(robot: &KnownRobot, tips: &[Pose], touches: &Touches, columns: &Columns, given: &Given) -> Option<Located> {
     let zero = vec![Vector3::zeros(); touches.contacts.len()];
     Some(match (given.tool, given.plate) {
         (Some(tool), plate) => {

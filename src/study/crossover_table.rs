@@ -49,9 +49,12 @@ pub fn study_verdict(study: &Study) -> Vec<String> {
     words
 }
 
-/// Cells in which F is better than the best two-stage estimator that knows the repeatability, and those in which it is worse, each with the ratio of
-/// their errors; and how many show no difference.
-fn outcomes(study: &Study) -> (Vec<(&StudyCell, Ratio)>, Vec<(&StudyCell, Ratio)>, usize) {
+/// Cells, each with the ratio of its errors.
+type Judged<'a> = Vec<(&'a StudyCell, Ratio)>;
+
+/// Cells in which F is better than the best two-stage estimator that knows the repeatability, and those in which it is worse,
+/// and how many show no difference.
+fn outcomes(study: &Study) -> (Judged<'_>, Judged<'_>, usize) {
     let (mut wins, mut losses, mut ties) = (Vec::new(), Vec::new(), 0);
     for cell in &study.cells {
         let rivals = cell.to_joint[..4].iter().flatten();
