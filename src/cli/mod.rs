@@ -23,7 +23,7 @@ use clap::{Parser, Subcommand};
 use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::prelude::*;
 
-use crate::error::{Code, Error, Result, closest_name};
+use crate::error::{Code, Error, Result, is_another_unit};
 use corrected_robot::{compensate, frames, verify, verify_args};
 use flags::arguments::command_text;
 use images::{detect, plate, poses};
@@ -172,7 +172,7 @@ fn without_other_unit(mut error: clap::Error) -> clap::Error {
         _ => None,
     };
     if let (Some(given), Some(tip)) = (word(ContextKind::InvalidValue), word(ContextKind::SuggestedValue))
-        && closest_name(given, [tip]).is_none()
+        && is_another_unit(given, tip)
     {
         error.remove(ContextKind::SuggestedValue);
     }
@@ -232,7 +232,7 @@ mod tests {
             assert_eq!(error.get(ContextKind::InvalidValue), Some(&ContextValue::String(unit.to_owned())));
             error.get(ContextKind::SuggestedValue).is_some()
         };
-        assert_eq!(["mrad", "mdeg", "gon", "radd"].map(tip), [false, false, false, true]);
+        assert_eq!(["mrad", "mdeg", "gon", "radd", "degrees"].map(tip), [false, false, false, true, true]);
     }
 
     /// Flags of programs of ROS that texts name, and a colour of the style sheet.

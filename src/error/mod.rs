@@ -209,7 +209,7 @@ pub fn closest_name<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -
         .into_iter()
         .map(|name| (plain(name), name))
         .filter(|(name, _)| name.len().abs_diff(given.len()) <= reach && numbers(name) == numbers_of_given)
-        .filter(|(name, _)| !is_of_another_axis(&given, name) && !is_another_unit(&given, name))
+        .filter(|(name, _)| !is_of_another_axis(&given, name) && !are_other_units(&given, name))
         .map(|(plain, name)| (edit_distance(&given, &plain), name))
         .filter(|(distance, _)| *distance <= reach)
         .min_by_key(|(distance, _)| *distance)
@@ -269,8 +269,12 @@ fn is_of_another_axis(a: &[char], b: &[char]) -> bool {
     }
 }
 
-/// Whether both are units, and not the same one.
-fn is_another_unit(a: &[char], b: &[char]) -> bool {
+/// Whether both names are of units, and not of the same one.
+pub fn is_another_unit(a: &str, b: &str) -> bool {
+    are_other_units(&plain(a), &plain(b))
+}
+
+fn are_other_units(a: &[char], b: &[char]) -> bool {
     let is_unit = |name: &[char]| UNITS.iter().any(|unit| unit.chars().eq(name.iter().copied()));
     a != b && is_unit(a) && is_unit(b)
 }

@@ -240,8 +240,13 @@ impl<'a> Search<'a> {
         let Self { setting, scene, .. } = self;
         let base_from_plate = setting.base_from_plate(plate_from_camera, placement);
         let in_sight = scene.in_sight(readings, base_from_plate.transform(&plate_from_camera.translation));
-        let place = |k: usize| base_from_plate.transform(&setting.plate.markers[k].position_m);
-        seen.iter().copied().filter(|&k| !in_sight.hides(&place(k))).collect()
+        // What is no higher above the plate carries it.
+        let over_plate = |k: usize| {
+            let marker = setting.plate.markers[k].position_m;
+            let sight = plate_from_camera.translation - marker;
+            marker + sight * (scene.support_m() / sight.z).min(1.0)
+        };
+        seen.iter().copied().filter(|&k| !in_sight.hides(&base_from_plate.transform(&over_plate(k)))).collect()
     }
 }
 

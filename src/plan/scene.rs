@@ -286,6 +286,11 @@ impl Scene {
         self.plate_in_hand_collides(&carried, &ends, table)
     }
 
+    /// Height above the face of a plate up to which something is what the plate lies on or in, m.
+    pub const fn support_m(&self) -> f64 {
+        HALF_PLATE_M + self.clearance_m
+    }
+
     /// What may stand between an eye and what it looks at, at these readings: boxes, and the links but the two that carry camera or plate.
     pub fn in_sight(&self, readings: &[f64], eye_m: Vector3<f64>) -> InSight {
         let links = self.robot.link_poses(readings);

@@ -17,6 +17,7 @@ use robotcal::plan::criterion::Criterion;
 use robotcal::plan::information::stop_information;
 use robotcal::plan::scene::{Capsule, Scene, SceneOptions};
 use robotcal::plan::setting::{Beside, PlannedStop, Setting};
+use robotcal::plan::visibility::seen_markers;
 use robotcal::plan::{Budget, Choice, Demand, Plan, PlanRequest, choose, compare_places, forecast, plan};
 use robotcal::problem::Image;
 use robotcal::series::{CameraMount, Plate, PlateKind};
@@ -257,6 +258,16 @@ fn nothing_stands_between_the_camera_and_the_markers_of_a_planned_pose() {
     assert!(through(&open, &request) > 0);
     assert_eq!(through(&guarded, &request), 0);
     assert!(guarded.legs.iter().all(|leg| guarded.pool[leg.stop].seen.len() >= request.candidates.sight.least_markers));
+    // What the plate lies on, or a little in, hides nothing.
+    for top in [0.0, 0.005] {
+        let bench = Pose::from_xyz_rpy([0.0, 0.0, top - 0.05], [0.0; 3]);
+        request.scene.boxes = vec![OrientedBox { pose: plate * bench, half_m: Vector3::new(0.3, 0.3, 0.05) }];
+        let setting = &request.setting;
+        for candidate in &plan(&request).unwrap().pool {
+            let all = seen_markers(&setting.plate, &setting.camera, &candidate.camera_from_plate);
+            assert_eq!(candidate.seen, all, "{top}");
+        }
+    }
     // A lid over the plate hides it from everywhere.
     let lid = Pose::from_xyz_rpy([0.0, 0.0, 0.05], [0.0; 3]);
     request.scene.boxes = vec![OrientedBox { pose: plate * lid, half_m: Vector3::new(0.3, 0.3, 0.005) }];

@@ -72,8 +72,9 @@ pub(super) fn read_solution_with_bytes(path: &Path) -> Result<(SolutionRecord, V
 
 fn changed(path: &Path) -> Notice {
     let what =
-        "is not as robotcal wrote it: somebody changed it since, and nothing that follows from it is known to be right";
-    let remedy = "run identify again, or take the file from a copy of the result";
+        "is not the file that robotcal wrote to this folder: it was changed since, or copied here from another result";
+    let remedy =
+        "where nobody knows why, run identify again: what follows from a changed solution is not known to be right";
     Notice::new(Code::SolutionDamaged, path.display(), what, remedy)
 }
 

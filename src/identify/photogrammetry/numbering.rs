@@ -30,10 +30,13 @@ pub(super) fn with_numbering(error: Error, problem: &Problem, camera: usize, sha
         return error;
     }
     let as_described = places(plate);
-    let described: Vec<Option<f64>> = own().map(|image| misfit(image, &as_described)).collect();
+    let described: Vec<Option<f64>> = own().map(|image| Some(PlaneFit::of(image, &as_described)?.misfit_px)).collect();
     let left = |numbering: &Numbering| {
-        let ratio =
-            |(image, described): (&Image, &Option<f64>)| Some(misfit(image, &numbering.places)? / (*described)?);
+        // Counts exchanged and ids down the columns are the same plane from its two sides.
+        let ratio = |(image, described): (&Image, &Option<f64>)| {
+            let fit = PlaneFit::of(image, &numbering.places).filter(|fit| fit.is_front)?;
+            Some(fit.misfit_px / (*described)?)
+        };
         median(own().zip(&described).filter_map(ratio)).unwrap_or(f64::INFINITY)
     };
     let tried = numberings(plate).into_iter().map(|numbering| (left(&numbering), numbering));
@@ -88,15 +91,29 @@ fn lattice(plate: &Plate, (columns, rows): (u32, u32)) -> Vec<Vector3<f64>> {
     places(&Plate::lattice(plate.kind, columns, rows, plate.pitch_m, plate.tolerance_m))
 }
 
-/// RMS distance of the markers of an image from where a plane has them, px; `None` where no plane is determined, or the plate has not all of them.
-fn misfit(image: &Image, places: &[Vector3<f64>]) -> Option<f64> {
-    let seen = image.used().map(|o| Some((places.get(o.marker)?.xy(), o.uv)));
-    let all: Vec<(Vector2<f64>, Vector2<f64>)> = seen.collect::<Option<_>>()?;
-    let (plane_m, pixels): (Vec<Vector2<f64>>, Vec<Vector2<f64>>) = all.iter().copied().unzip();
-    let Homography(map) = Homography::fit(&plane_m, &pixels)?;
-    let missed = all.iter().map(|(at, uv)| {
-        let q = map * at.push(1.0);
-        (q.xy() / q.z - uv).norm_squared()
-    });
-    Some((missed.sum::<f64>() / pixels.len() as f64).sqrt())
+/// Markers of an image on a plane.
+struct PlaneFit {
+    /// RMS distance from where the plane has them, px.
+    misfit_px: f64,
+    /// The side that z points to is seen.
+    is_front: bool,
+}
+
+impl PlaneFit {
+    /// `None` where no plane is determined, or the plate has not all of them.
+    fn of(image: &Image, places: &[Vector3<f64>]) -> Option<Self> {
+        let seen = image.used().map(|o| Some((places.get(o.marker)?.xy(), o.uv)));
+        let all: Vec<(Vector2<f64>, Vector2<f64>)> = seen.collect::<Option<_>>()?;
+        let (plane_m, pixels): (Vec<Vector2<f64>>, Vec<Vector2<f64>>) = all.iter().copied().unzip();
+        let Homography(map) = Homography::fit(&plane_m, &pixels)?;
+        let onto = |at: &Vector2<f64>| map * at.push(1.0);
+        let missed = all.iter().map(|(at, uv)| {
+            let q = onto(at);
+            (q.xy() / q.z - uv).norm_squared()
+        });
+        let misfit_px = (missed.sum::<f64>() / pixels.len() as f64).sqrt();
+        // v points down: from the front the map of x and y to u and v turns the other way round.
+        let is_front = map.determinant() * onto(plane_m.first()?).z < 0.0;
+        Some(Self { misfit_px, is_front })
+    }
 }

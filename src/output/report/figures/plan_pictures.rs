@@ -5,7 +5,6 @@ use nalgebra::{Vector2, Vector3};
 use crate::geom::Pose;
 use crate::output::report::page::svg::{Anchor, Svg};
 use crate::output::report::wording::words::plain;
-use crate::plan::visibility::seen_markers;
 use crate::plan::{Forecast, JointRange, Plan, PlanRequest};
 use crate::series::CameraMount;
 use crate::urdf::JointKind;
@@ -125,9 +124,10 @@ pub(in crate::output::report) fn coverage(request: &PlanRequest, plan: &Plan) ->
     let size = [f64::from(camera.width_px), f64::from(camera.height_px)];
     let mut counts = vec![0usize; CELLS[0] * CELLS[1]];
     for leg in &plan.legs {
-        let pose = &plan.pool[leg.stop].camera_from_plate;
-        for k in seen_markers(&setting.plate, camera, pose) {
-            let Some(uv) = camera.project(&pose.transform(&setting.plate.markers[k].position_m)) else { continue };
+        let candidate = &plan.pool[leg.stop];
+        for &k in &candidate.seen {
+            let at = candidate.camera_from_plate.transform(&setting.plate.markers[k].position_m);
+            let Some(uv) = camera.project(&at) else { continue };
             let cell =
                 |a: usize| ((uv[a] + 0.5) / size[a] * CELLS[a] as f64).clamp(0.0, CELLS[a] as f64 - 1.0) as usize;
             counts[cell(1) * CELLS[0] + cell(0)] += 1;
