@@ -11,7 +11,7 @@ use super::model_choice::near_nominal::near_nominal;
 use super::options::Options;
 use super::solution::{Evidence, LensEvidence, Solution};
 use super::start::turns;
-use crate::diagnose::{Finding, ToolInPoses, follows_from_tool};
+use crate::diagnose::{Finding, ToolInPoses, Weight, follows_from_tool};
 use crate::error::{Notice, Result};
 use crate::model::joint_terms::RobotModel;
 use crate::model::robot::Robot;
@@ -60,7 +60,11 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let mut solution = Solution { evidences, lenses, ..fit.judged(&lensed, options.estimator)? };
     solution.findings.extend(notices.into_iter().map(Into::into));
     solution.findings.extend(of_postures.map(|t| t.finding(series, &told).into()));
-    if let Some(tool) = of_tool(&rigid, &told, options) {
+    // What moved in the series fits with a tool or frame somewhat better, too.
+    let moved = |f: &Finding| f.weight() == Weight::Gate && matches!(f, Finding::Displaced(_) | Finding::ZeroMoved(_));
+    if !solution.findings.iter().any(moved)
+        && let Some(tool) = of_tool(&rigid, &told, options)
+    {
         let of_tool = told.iter().filter(|series| tool.series.contains(&series.name));
         let mountings: Vec<&str> = of_tool.map(|series| series.mounting.as_str()).collect();
         solution.findings.retain(|other| !follows_from_tool(other, &mountings));

@@ -216,7 +216,7 @@ fn a_solution_that_somebody_changed_is_told() {
     assert!(!shown().contains(&code), "{}", shown());
     let written = std::fs::read_to_string(&solution).unwrap();
     std::fs::write(&solution, written.replacen('0', "1", 1)).unwrap();
-    assert_says(&shown(), Code::SolutionDamaged, &[solution.to_str().unwrap()]);
+    assert!(shown().contains(&code), "{}", shown());
 }
 
 #[test]

@@ -171,9 +171,13 @@ impl Found {
         let mut common = other.lattice.iter().filter_map(common).peekable();
         let is_same = self.print.legacy == other.print.legacy && common.peek().is_some() && common.all(|same| same);
         let (mut best, rest) = if other.explains() >= self.explains() { (other, self) } else { (self, other) };
+        let before = best.lattice.len();
         for (at, uv) in rest.lattice.into_iter().filter(|_| is_same) {
             best.lattice.entry(at).or_insert(uv);
         }
+        // They may be on a board of the other layout as well.
+        let added = best.lattice.len() - before;
+        best.rival = best.rival.map(|(markers, corners)| (markers, corners + added));
         best
     }
 
@@ -334,7 +338,14 @@ fn on_markers(
         let found = Found { has_further_row: false, ..Found::of(print, &markers, lattice, board) };
         found.has_place.then_some(found)
     };
-    with_rival(stated.filter_map(on_board).collect()).ok_or_else(|| no_board(plate))
+    let all: Vec<Found> = stated.filter_map(on_board).collect();
+    // Corners are where markers have them, and tell nothing of the layout.
+    let (own, others): (Vec<Found>, Vec<Found>) =
+        all.into_iter().partition(|found| prints.first().is_some_and(|stated| stated.legacy == found.print.legacy));
+    let rival = others.iter().map(|found| found.markers).max();
+    let own = own.into_iter().max_by_key(|found| found.markers).filter(|own| Some(own.markers) >= rival);
+    own.map(|own| Found { rival: rival.map(|markers| (markers, own.lattice.len())), ..own })
+        .ok_or_else(|| no_board(plate))
 }
 
 /// Whether markers of the last row of squares are read: that takes the corners below them, and at the end of a board there are none.

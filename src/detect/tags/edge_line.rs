@@ -107,10 +107,12 @@ pub struct Side {
 }
 
 impl Side {
-    /// How much of an end is left out, where the next side is nearer than `clear_px` to the ink as deep as this beside it.
-    fn spare(&self, end: usize, clear_px: f64, deep_px: f64) -> f64 {
-        let cosine = self.sharpness[end].clamp(0.0, SHARPEST);
-        (clear_px + deep_px * cosine) / (1.0 - cosine * cosine).sqrt()
+    /// How much of either end is left out where the next side is nearer than `clear_px`, px: at the side, and for every px deeper in the ink.
+    fn spare(&self, clear_px: f64) -> [[f64; 2]; 2] {
+        self.sharpness.map(|cosine| {
+            let cosine = cosine.clamp(0.0, SHARPEST);
+            [clear_px, cosine].map(|part| part / (1.0 - cosine * cosine).sqrt())
+        })
     }
 }
 
@@ -263,9 +265,13 @@ impl EdgeLine {
         let reach = 3.0 * blur_px + 1.0;
         let room = |px: f64| (reach + spare_px).min((px - CLEAR_OF_BLURS * blur_px).max(0.5 * px).max(1.0));
         let (inner, outer) = (room(side.ink_px), room(side.paper_px));
-        let spare = |end: usize| side.spare(end, 2.5 * blur_px + ENDS_SPARE_PX, inner).min(length / 4.0);
-        let ends = [spare(0) - length / 2.0, length / 2.0 - spare(1)];
-        let [low, high] = self.extent(ends, reach);
+        // The deeper in the ink, the nearer the next side is to what lies there.
+        let spare = side.spare(2.5 * blur_px + ENDS_SPARE_PX);
+        let ends = |deep_px: f64| {
+            let [first, last] = spare.map(|[at_side, deeper]| (at_side + deep_px * deeper).min(length / 4.0));
+            [first - length / 2.0, length / 2.0 - last]
+        };
+        let [low, high] = self.extent(ends(0.0), reach);
         let last = Vector2::new(picture.width as f64 - 1.0, picture.height as f64 - 1.0);
         if low.min() < 0.0 || high.x > last.x || high.y > last.y {
             return Err("cut by the border");
@@ -279,7 +285,8 @@ impl EdgeLine {
                 let d = Vector2::new(u as f64, v as f64) - self.middle;
                 let (x, y) = (d.dot(&self.along), d.dot(&self.across));
                 let beside = y - self.offset(x);
-                if (ends[0]..=ends[1]).contains(&x) && beside >= -inner && beside <= outer {
+                let [from, to] = ends((-beside).max(0.0));
+                if (from..=to).contains(&x) && beside >= -inner && beside <= outer {
                     let value = picture.at(u, v);
                     pixels.push(Pixel { x, y, value: f64::from(value), saturated: value >= limit, light: 0.0 });
                 }

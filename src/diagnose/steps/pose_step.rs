@@ -209,6 +209,7 @@ fn places(step: &Step, body: Carried, problem: &Problem) -> Vec<String> {
         _ => Vec::new(),
     }
 }
+
 /// The sockets that it moves.
 fn sockets(step: &Step, problem: &Problem) -> BTreeSet<usize> {
     step.shown.iter().filter_map(|shown| shown.socket(problem)).collect()

@@ -114,6 +114,9 @@ fn pose(tool: &Vector6<f64>) -> Pose {
     Pose::new(exp_so3(&turn), tool.fixed_rows::<3>(0).into_owned())
 }
 
+/// A tool or a frame, and the readings of all stops near which theirs are looked for.
+type Start = (Vector6<f64>, Vec<Vec<f64>>);
+
 /// Other postures of a stop that reach a pose of the flange than its readings.
 trait Others: Fn(&PosedStop, &Pose, &[f64]) -> Vec<Vec<f64>> + Sync {}
 impl<F: Fn(&PosedStop, &Pose, &[f64]) -> Vec<Vec<f64>> + Sync> Others for F {}
@@ -217,41 +220,62 @@ impl<'a> Search<'a> {
         let none = self.at(Vector6::zeros(), |k| &taken[k])?;
         // Out of reach is worse than a stop usually is without a tool.
         self.unreached = (2.0 * none.cost / self.equations as f64).sqrt();
-        // Where stops fit as they are, nothing is to be told.
-        if none.cost < self.equations as f64 {
+        let along = STARTS_M.map(|z| (Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0), taken.clone()));
+        // Where stops fit as they are, their postures are right.
+        let fits = |cost: f64| cost < self.equations as f64;
+        let (without, best) = match fits(none.cost) {
+            true => (none.cost, self.all_least(along.into(), |tried| tried).into_iter().next()?),
+            false => self.best_of_postures(along)?,
+        };
+        let gain = 0.5 * self.equations as f64 * (without.min(none.cost) / best.cost).ln();
+        tracing::debug!(of = ?self.of, gain, left = best.cost, at = ?best.tool.as_slice(), "tool in poses");
+        // What fits with no tool either has another cause.
+        if best.cost > self.equations as f64 {
             return None;
         }
-        let best = self.best(taken)?;
-        let gain = 0.5 * self.equations as f64 * (none.cost / best.cost).ln();
-        tracing::debug!(of = ?self.of, gain, at = ?best.tool.as_slice(), "tool in poses");
         let sigma_m = self.sigma_m(&best)?;
         let far_m = best.tool.fixed_rows::<3>(0).norm();
         let is_told = gain > limits.tool_log_odds && far_m > limits.tool_sigmas * sigma_m.norm();
         is_told.then_some((self.of, best, sigma_m, gain))
     }
 
-    /// The best one, from all starts with the readings that were `taken`, and from all families of postures.
-    fn best(&mut self, taken: Vec<Vec<f64>>) -> Option<Tried> {
+    /// Those that the search ends at from all starts, each gone on with as told, the best first.
+    fn all_least(&self, starts: Vec<Start>, then: impl Fn(Tried) -> Tried + Sync) -> Vec<Tried> {
+        let least = |(tool, readings): Start| Some(then(self.least(self.at(tool, |k| &readings[k])?)?));
+        let mut found: Vec<Tried> = starts.into_par_iter().filter_map(least).collect();
+        found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        found
+    }
+
+    /// The best one with any postures, from these starts and from all families; and the least cost without a tool, with any postures, too.
+    fn best_of_postures(&mut self, along: [Start; 3]) -> Option<(f64, Tried)> {
         let Self { stops, arm, .. } = self;
         stops.par_iter_mut().for_each(|stop| {
             let others = arm.others(&stop.stated, &stop.postures[0]);
             stop.postures.extend(others);
         });
-        let along = STARTS_M.map(|z| (Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0), taken.clone()));
-        let of_families = families(&self.stops).into_iter().map(|family| (Vector6::zeros(), family));
-        let starts: Vec<_> = along.into_iter().chain(of_families).collect();
+        let families = families(&self.stops);
         let from_known =
             |stop: &PosedStop, flange: &Pose, own: &[f64]| self.arm.reached_from(&stop.postures, flange, own);
-        let settled = |(tool, readings): (Vector6<f64>, Vec<Vec<f64>>)| {
-            let least = self.least(self.at(tool, |k| &readings[k])?)?;
-            Some(self.settled(least, from_known))
-        };
-        let mut found: Vec<Tried> = starts.into_par_iter().filter_map(settled).collect();
-        found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let without = families.par_iter().filter_map(|family| self.without(family, &from_known));
+        let without = without.collect::<Vec<f64>>().into_iter().fold(f64::INFINITY, f64::min);
+        let of_families = families.into_iter().map(|family| (Vector6::zeros(), family));
+        let starts: Vec<Start> = along.into_iter().chain(of_families).collect();
+        let mut found = self.all_least(starts, |tried| self.settled(tried, from_known));
         found.truncate(RECHOSEN);
         let from_all = |_: &PosedStop, flange: &Pose, own: &[f64]| self.arm.others(flange, own);
         let found = found.into_iter().map(|tried| self.settled(tried, from_all));
-        found.min_by(|a, b| a.cost.total_cmp(&b.cost))
+        Some((without, found.min_by(|a, b| a.cost.total_cmp(&b.cost))?))
+    }
+
+    /// The cost without a tool, from a family of postures, each stop in the one that all others predict best.
+    fn without(&self, family: &[Vec<f64>], others: &impl Others) -> Option<f64> {
+        let mut tried = self.at(Vector6::zeros(), |k| &family[k])?;
+        for _ in 0..RECHOICES {
+            let Some(readings) = self.rechosen(&tried, others) else { break };
+            tried = self.at(Vector6::zeros(), |k| &readings[k])?;
+        }
+        Some(tried.cost)
     }
 
     /// With the postures that all stops predict best of each other, of those that `others` gives, and the best tool with them, in turns.
