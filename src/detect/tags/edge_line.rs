@@ -54,8 +54,6 @@ const BLUR_RANGE_PX: (f64, f64) = (0.2, 8.0);
 const MOST_STEPS: usize = 24;
 /// Beside what the next side rounds off, so much of both ends is left out, px: they are not known better.
 pub(super) const ENDS_SPARE_PX: f64 = 1.0;
-/// Cosine of the sharpest angle of two sides.
-const SHARPEST: f64 = 0.99;
 /// A step below this moves no corner visibly, px; and what is good enough where pixels pass in and out of saturation.
 const AT_REST_PX: f64 = 1e-4;
 const NEARLY_AT_REST_PX: f64 = 5e-3;
@@ -102,18 +100,6 @@ pub struct Side {
     /// How far ink and paper reach beside it undisturbed, px.
     pub ink_px: f64,
     pub paper_px: f64,
-    /// Cosines of the angles of ink between it and the next sides, where it begins and where it ends.
-    pub sharpness: [f64; 2],
-}
-
-impl Side {
-    /// How much of either end is left out where the next side is nearer than `clear_px`, px: at the side, and for every px deeper in the ink.
-    fn spare(&self, clear_px: f64) -> [[f64; 2]; 2] {
-        self.sharpness.map(|cosine| {
-            let cosine = cosine.clamp(0.0, SHARPEST);
-            [clear_px, cosine].map(|part| part / (1.0 - cosine * cosine).sqrt())
-        })
-    }
 }
 
 /// A rectangle of paper in the ink beside a side, or of ink in its paper.
@@ -262,16 +248,11 @@ impl EdgeLine {
         length: f64,
         [blur_px, spare_px]: [f64; 2],
     ) -> Result<Vec<Pixel>, &'static str> {
+        let half = length / 2.0 - (2.5 * blur_px + ENDS_SPARE_PX).min(length / 4.0);
         let reach = 3.0 * blur_px + 1.0;
         let room = |px: f64| (reach + spare_px).min((px - CLEAR_OF_BLURS * blur_px).max(0.5 * px).max(1.0));
         let (inner, outer) = (room(side.ink_px), room(side.paper_px));
-        // The deeper in the ink, the nearer the next side is to what lies there.
-        let spare = side.spare(2.5 * blur_px + ENDS_SPARE_PX);
-        let ends = |deep_px: f64| {
-            let [first, last] = spare.map(|[at_side, deeper]| (at_side + deep_px * deeper).min(length / 4.0));
-            [first - length / 2.0, length / 2.0 - last]
-        };
-        let [low, high] = self.extent(ends(0.0), reach);
+        let [low, high] = self.extent(half, reach);
         let last = Vector2::new(picture.width as f64 - 1.0, picture.height as f64 - 1.0);
         if low.min() < 0.0 || high.x > last.x || high.y > last.y {
             return Err("cut by the border");
@@ -285,8 +266,7 @@ impl EdgeLine {
                 let d = Vector2::new(u as f64, v as f64) - self.middle;
                 let (x, y) = (d.dot(&self.along), d.dot(&self.across));
                 let beside = y - self.offset(x);
-                let [from, to] = ends((-beside).max(0.0));
-                if (from..=to).contains(&x) && beside >= -inner && beside <= outer {
+                if x.abs() <= half && beside >= -inner && beside <= outer {
                     let value = picture.at(u, v);
                     pixels.push(Pixel { x, y, value: f64::from(value), saturated: value >= limit, light: 0.0 });
                 }
@@ -296,8 +276,8 @@ impl EdgeLine {
     }
 
     /// Where the side is, px to both sides of it, least and most in the picture.
-    fn extent(&self, [from, to]: [f64; 2], reach: f64) -> [Vector2<f64>; 2] {
-        let places = [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| from + part * (to - from));
+    fn extent(&self, half: f64, reach: f64) -> [Vector2<f64>; 2] {
+        let places = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|part| part * half);
         let beside = places.map(|x| [-reach, reach].map(|y| (x, self.offset(x) + y)));
         let points = beside.into_iter().flatten().map(|(x, y)| self.middle + self.along * x + self.across * y);
         points

@@ -222,17 +222,12 @@ impl<'a> Search<'a> {
         self.unreached = (2.0 * none.cost / self.equations as f64).sqrt();
         let along = STARTS_M.map(|z| (Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0), taken.clone()));
         // Where stops fit as they are, their postures are right.
-        let fits = |cost: f64| cost < self.equations as f64;
-        let (without, best) = match fits(none.cost) {
+        let (without, best) = match none.cost < self.equations as f64 {
             true => (none.cost, self.all_least(along.into(), |tried| tried).into_iter().next()?),
             false => self.best_of_postures(along)?,
         };
         let gain = 0.5 * self.equations as f64 * (without.min(none.cost) / best.cost).ln();
         tracing::debug!(of = ?self.of, gain, left = best.cost, at = ?best.tool.as_slice(), "tool in poses");
-        // What fits with no tool either has another cause.
-        if best.cost > self.equations as f64 {
-            return None;
-        }
         let sigma_m = self.sigma_m(&best)?;
         let far_m = best.tool.fixed_rows::<3>(0).norm();
         let is_told = gain > limits.tool_log_odds && far_m > limits.tool_sigmas * sigma_m.norm();
