@@ -24,6 +24,7 @@ const TURNS: usize = 50;
 const HELD: f64 = 1e-12;
 
 /// What was seen at a stop says of one of its postures.
+#[derive(Clone)]
 pub(super) struct Candidate {
     pub readings: Vec<f64>,
     /// `V^-1/2 G` and `V^-1/2 e` of all that was seen there.
@@ -32,8 +33,9 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    fn equations(&self) -> (&DMatrix<f64>, &DVector<f64>) {
-        (&self.g, &self.e)
+    /// What parameters leave.
+    pub fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
+        &self.e - &self.g * x
     }
 }
 
@@ -145,11 +147,9 @@ impl Stops {
         for &s in order {
             let stop = &self.all[s];
             let next = |(k, (_, known)): (usize, &(Vec<usize>, Knowledge))| {
-                let factor = known.factor()?;
-                let x = factor.solve(&known.rhs);
-                let so_far = known.squares - known.rhs.dot(&x);
-                let costs = stop.predicted_by(&factor, &x)?;
-                Some(costs.into_iter().enumerate().map(move |(c, cost)| (so_far + cost, k, c)).collect::<Vec<_>>())
+                let least = known.least()?;
+                let costs = stop.predicted(&least)?;
+                Some(costs.into_iter().enumerate().map(|(c, cost)| (least.cost + cost, k, c)).collect::<Vec<_>>())
             };
             let grown: Vec<Option<Vec<(f64, usize, usize)>>> = kept.par_iter().enumerate().map(next).collect();
             let mut grown: Vec<(f64, usize, usize)> = grown.into_iter().flatten().flatten().collect();
@@ -158,7 +158,7 @@ impl Stops {
             let with = |&(_, k, c): &(f64, usize, usize)| {
                 let (mut postures, mut known) = kept[k].clone();
                 postures[s] = c;
-                known.add(stop.candidates[c].equations(), 1.0);
+                known.add(&stop.candidates[c], 1.0);
                 (postures, known)
             };
             kept = grown.par_iter().map(with).collect();
@@ -171,11 +171,11 @@ impl Stops {
         let mut known = self.told_by(postures);
         let mut count = 0;
         for (stop, &c) in self.all.iter().zip(postures).filter(|(stop, _)| stop.candidates.len() > 1) {
-            known.add(stop.candidates[c].equations(), -1.0);
-            let costs = stop.predicted(&known)?;
+            known.add(&stop.candidates[c], -1.0);
+            let costs = stop.predicted(&known.least()?)?;
             let is_as_good = |(k, cost): (usize, &f64)| k != c && *cost <= costs[c] + as_good;
             count += usize::from(costs.iter().enumerate().any(is_as_good));
-            known.add(stop.candidates[c].equations(), 1.0);
+            known.add(&stop.candidates[c], 1.0);
         }
         Some(count)
     }
@@ -183,25 +183,23 @@ impl Stops {
     /// What a choice says of the parameters.
     fn told_by(&self, postures: &[usize]) -> Knowledge {
         let mut known = Knowledge::of_priors(&self.prior);
-        self.all.iter().zip(postures).for_each(|(stop, &c)| known.add(stop.candidates[c].equations(), 1.0));
+        self.all.iter().zip(postures).for_each(|(stop, &c)| known.add(&stop.candidates[c], 1.0));
         known
     }
 
     /// With its cost.
     fn choice(&self, postures: Vec<usize>) -> Option<Choice> {
-        let known = self.told_by(&postures);
-        let x = known.factor()?.solve(&known.rhs);
-        Some(Choice { postures, cost: known.squares - known.rhs.dot(&x) })
+        let cost = self.told_by(&postures).least()?.cost;
+        Some(Choice { postures, cost })
     }
 
     /// Fits and chooses in turns.
     fn settled(&self, mut postures: Vec<usize>) -> Option<Choice> {
         for _ in 0..TURNS {
-            let known = self.told_by(&postures);
-            let x = known.factor()?.solve(&known.rhs);
+            let Least { x, cost, .. } = self.told_by(&postures).least()?;
             let next: Vec<usize> = self.all.iter().map(|s| s.nearest(&x)).collect();
             if next == postures {
-                return Some(Choice { postures, cost: known.squares - known.rhs.dot(&x) });
+                return Some(Choice { postures, cost });
             }
             postures = next;
         }
@@ -214,14 +212,14 @@ impl Stops {
         for _ in 0..TURNS {
             let mut is_changed = false;
             for (stop, c) in self.all.iter().zip(&mut postures) {
-                known.add(stop.candidates[*c].equations(), -1.0);
-                let costs = stop.predicted(&known)?;
+                known.add(&stop.candidates[*c], -1.0);
+                let costs = stop.predicted(&known.least()?)?;
                 let best = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(*c);
                 if costs[best] < costs[*c] {
                     *c = best;
                     is_changed = true;
                 }
-                known.add(stop.candidates[*c].equations(), 1.0);
+                known.add(&stop.candidates[*c], 1.0);
             }
             if !is_changed {
                 break;
@@ -234,12 +232,12 @@ impl Stops {
     fn without_doubtful(&self, mut postures: Vec<usize>, as_good: f64) -> Option<Vec<usize>> {
         let mut known = self.told_by(&postures);
         for (stop, c) in self.all.iter().zip(&mut postures).filter(|(_, c)| **c > 0) {
-            known.add(stop.candidates[*c].equations(), -1.0);
-            let costs = stop.predicted(&known)?;
+            known.add(&stop.candidates[*c], -1.0);
+            let costs = stop.predicted(&known.least()?)?;
             if costs[0] <= costs[*c] + as_good {
                 *c = 0;
             }
-            known.add(stop.candidates[*c].equations(), 1.0);
+            known.add(&stop.candidates[*c], 1.0);
         }
         Some(postures)
     }
@@ -249,8 +247,16 @@ impl Stops {
 #[derive(Clone)]
 pub(super) struct Knowledge {
     information: DMatrix<f64>,
-    pub rhs: DVector<f64>,
-    pub squares: f64,
+    rhs: DVector<f64>,
+    squares: f64,
+}
+
+/// The parameters with the least cost.
+pub(super) struct Least {
+    pub x: DVector<f64>,
+    pub cost: f64,
+    /// Of their information.
+    pub factor: SymmetricFactor,
 }
 
 impl Knowledge {
@@ -260,17 +266,19 @@ impl Knowledge {
     }
 
     /// Takes a posture of a stop in, or by a weight of -1 out again.
-    pub fn add(&mut self, (g, e): (&DMatrix<f64>, &DVector<f64>), weight: f64) {
+    pub fn add(&mut self, Candidate { g, e, .. }: &Candidate, weight: f64) {
         self.information.gemm(weight, &g.transpose(), g, 1.0);
         self.rhs.gemv_tr(weight, g, e, 1.0);
         self.squares += weight * e.norm_squared();
     }
 
-    pub fn factor(&self) -> Option<SymmetricFactor> {
+    pub fn least(&self) -> Option<Least> {
         let mut n = self.information.clone();
         let held = HELD * n.diagonal().max();
         (0..n.nrows()).for_each(|k| n[(k, k)] += held);
-        SymmetricFactor::new(&n).ok()
+        let factor = SymmetricFactor::new(&n).ok()?;
+        let x = factor.solve(&self.rhs);
+        Some(Least { cost: self.squares - self.rhs.dot(&x), x, factor })
     }
 }
 
@@ -282,22 +290,18 @@ impl Stop {
     }
 
     fn nearest(&self, x: &DVector<f64>) -> usize {
-        let costs: Vec<f64> = self.candidates.iter().map(|c| (&c.e - &c.g * x).norm_squared()).collect();
+        let costs: Vec<f64> = self.candidates.iter().map(|c| c.residual(x).norm_squared()).collect();
         (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0)
     }
 
     /// What every posture adds to the cost of the other stops: with `r = e - G x` and `W = 1 + G N^-1 G'` by their `x` and `N`, `r' W^-1 r`.
-    fn predicted(&self, others: &Knowledge) -> Option<Vec<f64>> {
-        let factor = others.factor()?;
-        self.predicted_by(&factor, &factor.solve(&others.rhs))
-    }
-
-    fn predicted_by(&self, factor: &SymmetricFactor, x: &DVector<f64>) -> Option<Vec<f64>> {
+    fn predicted(&self, Least { x, factor, .. }: &Least) -> Option<Vec<f64>> {
         let solved = factor.solve_many(&self.across);
-        let cost = |(c, Candidate { g, e, .. }): (usize, &Candidate)| {
-            let mut w = DMatrix::identity(e.len(), e.len());
-            w.gemm(1.0, g, &solved.columns(c * e.len(), e.len()), 1.0);
-            let r = e - g * x;
+        let cost = |(c, candidate): (usize, &Candidate)| {
+            let rows = candidate.e.len();
+            let mut w = DMatrix::identity(rows, rows);
+            w.gemm(1.0, &candidate.g, &solved.columns(c * rows, rows), 1.0);
+            let r = candidate.residual(x);
             Some(r.dot(&w.cholesky()?.solve(&r)))
         };
         self.candidates.iter().enumerate().map(cost).collect()

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::choice::Candidate;
 use crate::assess::Limits;
 use crate::error::Result;
 use crate::fit::FreePoses;
@@ -97,16 +98,16 @@ impl Compared {
         Some(Self { adjustment, free, columns, prior, stops })
     }
 
-    /// `V^-1/2 G` and `V^-1/2 e` of what was seen at a stop at some readings, by the unknowns of a state.
-    pub fn seen_at(
+    /// What was seen at a stop says of some readings, by the unknowns of a state.
+    pub fn candidate(
         &self,
         (state, origins): (&State, &LinearOrigins),
         seen: &SeenAt,
-        readings: &[f64],
-    ) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        readings: Vec<f64>,
+    ) -> Option<Candidate> {
         let problem = &self.adjustment.problem;
         let read = problem.stops[seen.stop].posture.as_ref()?;
-        let (posture, zeros) = (approached(read, readings), vec![0.0; readings.len()]);
+        let (posture, zeros) = (approached(read, &readings), vec![0.0; readings.len()]);
         let from = || TakenFrom::rigid(&posture, &zeros);
         let of_image = |&i: &usize| {
             let pose = self.free.poses[i].as_ref()?;
@@ -128,8 +129,8 @@ impl Compared {
         let all = seen.images.iter().map(of_image).chain(seen.bodies.iter().map(of_body));
         let (g, e): (Vec<_>, Vec<_>) = all.collect::<Option<Vec<_>>>()?.into_iter().unzip();
         let rows: Vec<_> = g.iter().flat_map(DMatrix::row_iter).collect();
-        (!rows.is_empty())
-            .then(|| (DMatrix::from_rows(&rows), DVector::from_vec(e.iter().flatten().copied().collect())))
+        let e = e.iter().flatten().copied().collect();
+        (!rows.is_empty()).then(|| Candidate { readings, g: DMatrix::from_rows(&rows), e: DVector::from_vec(e) })
     }
 
     /// Of a residual that depends on a pose, with the noise of what was seen and that of the readings.

@@ -18,7 +18,7 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
-use super::choice::{Before, Candidate, Stop, Stops};
+use super::choice::{Before, Stop, Stops};
 use super::compared::{Compared, SeenAt};
 use crate::assess::Limits;
 use crate::diagnose::ComputedPostures;
@@ -99,10 +99,7 @@ fn stop(compared: &Compared, series: &[MeasuredSeries], seen: &SeenAt) -> Option
     let own = series[s].stops[row].readings.clone()?;
     let others = series[s].postures.get(row).cloned().unwrap_or_default();
     let origins = state.robot.linear_origins();
-    let of = |readings: Vec<f64>| {
-        let (g, e) = compared.seen_at((state, &origins), seen, &readings)?;
-        Some(Candidate { readings, g, e })
-    };
+    let of = |readings: Vec<f64>| compared.candidate((state, &origins), seen, readings);
     let candidates = std::iter::once(own).chain(others).map(of).collect::<Option<Vec<_>>>()?;
     Some((rows, Stop::of(candidates)))
 }

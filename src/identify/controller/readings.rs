@@ -324,20 +324,20 @@ impl Arm {
 
     /// Other postures that reach the pose of some readings; none where they are without number.
     pub fn others(&self, pose: &Pose, readings: &[f64]) -> Vec<Vec<f64>> {
-        let kinds = &self.robot.chain.reading_kinds;
-        let mut all = vec![readings.to_vec()];
-        for found in self.postures_of(pose).into_iter().map(|q| self.turned(q, readings)) {
-            FullTurns::Alike.add(found, &mut all, kinds);
-        }
-        let others = all.split_off(1);
+        let others = self.other_than(readings, self.postures_of(pose).into_iter());
         if others.len() > MOST_POSTURES { Vec::new() } else { others }
     }
 
     /// Postures other than some readings that reach a pose, looked for from those of another one.
     pub fn reached_from(&self, postures: &[Vec<f64>], pose: &Pose, readings: &[f64]) -> Vec<Vec<f64>> {
+        self.other_than(readings, postures.iter().filter_map(|from| self.reading_near(pose, from)))
+    }
+
+    /// Those found that differ from some readings and from each other, as near to them as full turns bring them.
+    fn other_than(&self, readings: &[f64], found: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
         let mut all = vec![readings.to_vec()];
-        for found in postures.iter().filter_map(|from| self.reading_near(pose, from)) {
-            FullTurns::Alike.add(self.turned(found, readings), &mut all, &self.robot.chain.reading_kinds);
+        for found in found.map(|q| self.turned(q, readings)) {
+            FullTurns::Alike.add(found, &mut all, &self.robot.chain.reading_kinds);
         }
         all.split_off(1)
     }

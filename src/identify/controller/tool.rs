@@ -16,7 +16,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6, SymmetricEigen, Vector3, Vector6};
 use rayon::prelude::*;
 
-use super::choice::{Candidate, Knowledge, Stop, Stops};
+use super::choice::{Candidate, Knowledge, Least, Stop, Stops};
 use super::compared::{Compared, SeenAt};
 use super::readings::Arm;
 use crate::assess::Limits;
@@ -56,7 +56,7 @@ pub(in crate::identify) fn tool_in_poses(
     let best = Compared::with("tool in poses", robot, (series, limits), hold, |compared| {
         let searches = [PosesOf::Tool, PosesOf::Frame].map(|of| Search::new(compared, series, robot, of));
         let found = searches.into_iter().flatten().filter_map(|search| search.told(limits));
-        found.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))
+        found.min_by(|a, b| a.1.cost().total_cmp(&b.1.cost()))
     });
     let (of, best, sigma_m, gain) = best?;
     let place_m = best.tool.fixed_rows::<3>(0).into_owned();
@@ -84,19 +84,10 @@ struct Search<'a> {
     unreached: f64,
 }
 
-/// What a stop says with a tool or a frame.
+/// A stop with a tool or a frame.
 struct StopWith {
-    readings: Vec<f64>,
-    /// `V^-1/2 G` and `V^-1/2 e`.
-    g: DMatrix<f64>,
-    e: DVector<f64>,
+    candidate: Candidate,
     is_reached: bool,
-}
-
-impl StopWith {
-    fn residual(&self, x: &DVector<f64>) -> DVector<f64> {
-        &self.e - &self.g * x
-    }
 }
 
 /// A tool or a frame, and what the stops say with it.
@@ -104,9 +95,17 @@ struct Tried {
     /// m, and rad as a rotation vector.
     tool: Vector6<f64>,
     stops: Vec<StopWith>,
-    known: Knowledge,
-    x: DVector<f64>,
-    cost: f64,
+    least: Least,
+}
+
+impl Tried {
+    const fn cost(&self) -> f64 {
+        self.least.cost
+    }
+
+    fn readings(&self, stop: usize) -> &[f64] {
+        &self.stops[stop].candidate.readings
+    }
 }
 
 fn pose(tool: &Vector6<f64>) -> Pose {
@@ -206,10 +205,11 @@ impl<'a> Search<'a> {
                 let rows = 6 * stop.seen.images.len();
                 let g = DMatrix::zeros(rows, self.compared.prior.len());
                 let e = DVector::from_element(rows, self.unreached);
-                return Some(StopWith { readings: from(k).to_vec(), g, e, is_reached: false });
+                let candidate = Candidate { readings: from(k).to_vec(), g, e };
+                return Some(StopWith { candidate, is_reached: false });
             };
-            let (g, e) = self.compared.seen_at((&state, &origins), &stop.seen, &readings)?;
-            Some(StopWith { readings, g, e, is_reached: true })
+            let candidate = self.compared.candidate((&state, &origins), &stop.seen, readings)?;
+            Some(StopWith { candidate, is_reached: true })
         };
         self.stops.par_iter().enumerate().map(one).collect()
     }
@@ -219,15 +219,15 @@ impl<'a> Search<'a> {
         let taken: Vec<Vec<f64>> = self.stops.iter().map(|stop| stop.postures[0].clone()).collect();
         let none = self.at(Vector6::zeros(), |k| &taken[k])?;
         // Out of reach is worse than a stop usually is without a tool.
-        self.unreached = (2.0 * none.cost / self.equations as f64).sqrt();
+        self.unreached = (2.0 * none.cost() / self.equations as f64).sqrt();
         let along = STARTS_M.map(|z| (Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0), taken.clone()));
         // Where stops fit as they are, their postures are right.
-        let (without, best) = match none.cost < self.equations as f64 {
-            true => (none.cost, self.all_least(along.into(), |tried| tried).into_iter().next()?),
+        let (without, best) = match none.cost() < self.equations as f64 {
+            true => (none.cost(), self.all_least(along.into(), |tried| tried).into_iter().next()?),
             false => self.best_of_postures(along)?,
         };
-        let gain = 0.5 * self.equations as f64 * (without.min(none.cost) / best.cost).ln();
-        tracing::debug!(of = ?self.of, gain, left = best.cost, at = ?best.tool.as_slice(), "tool in poses");
+        let gain = 0.5 * self.equations as f64 * (without.min(none.cost()) / best.cost()).ln();
+        tracing::debug!(of = ?self.of, gain, left = best.cost(), at = ?best.tool.as_slice(), "tool in poses");
         let sigma_m = self.sigma_m(&best)?;
         let far_m = best.tool.fixed_rows::<3>(0).norm();
         let is_told = gain > limits.tool_log_odds && far_m > limits.tool_sigmas * sigma_m.norm();
@@ -238,7 +238,7 @@ impl<'a> Search<'a> {
     fn all_least(&self, starts: Vec<Start>, then: impl Fn(Tried) -> Tried + Sync) -> Vec<Tried> {
         let least = |(tool, readings): Start| Some(then(self.least(self.at(tool, |k| &readings[k])?)?));
         let mut found: Vec<Tried> = starts.into_par_iter().filter_map(least).collect();
-        found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        found.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
         found
     }
 
@@ -260,7 +260,7 @@ impl<'a> Search<'a> {
         found.truncate(RECHOSEN);
         let from_all = |_: &PosedStop, flange: &Pose, own: &[f64]| self.arm.others(flange, own);
         let found = found.into_iter().map(|tried| self.settled(tried, from_all));
-        Some((without, found.min_by(|a, b| a.cost.total_cmp(&b.cost))?))
+        Some((without, found.min_by(|a, b| a.cost().total_cmp(&b.cost()))?))
     }
 
     /// The cost without a tool, from a family of postures, each stop in the one that all others predict best.
@@ -270,7 +270,7 @@ impl<'a> Search<'a> {
             let Some(readings) = self.rechosen(&tried, others) else { break };
             tried = self.at(Vector6::zeros(), |k| &readings[k])?;
         }
-        Some(tried.cost)
+        Some(tried.cost())
     }
 
     /// With the postures that all stops predict best of each other, of those that `others` gives, and the best tool with them, in turns.
@@ -278,7 +278,7 @@ impl<'a> Search<'a> {
         for _ in 0..RECHOICES {
             let next =
                 self.rechosen(&tried, &others).and_then(|readings| self.least(self.at(tried.tool, |k| &readings[k])?));
-            match next.filter(|next| next.cost < tried.cost) {
+            match next.filter(|next| next.cost() < tried.cost()) {
                 Some(next) => tried = next,
                 None => break,
             }
@@ -291,15 +291,10 @@ impl<'a> Search<'a> {
         let of = pose(&tried.tool);
         let state = self.state(&of);
         let origins = state.robot.linear_origins();
-        let one = |(stop, own): (&PosedStop, &StopWith)| {
-            let flange = self.flange(&of, &stop.stated);
-            let others = others(stop, &flange, &own.readings);
-            let other = |readings: Vec<f64>| {
-                let (g, e) = self.compared.seen_at((&state, &origins), &stop.seen, &readings)?;
-                Some(Candidate { readings, g, e })
-            };
-            let own = Candidate { readings: own.readings.clone(), g: own.g.clone(), e: own.e.clone() };
-            let all: Option<Vec<_>> = std::iter::once(Some(own)).chain(others.into_iter().map(other)).collect();
+        let one = |(stop, StopWith { candidate: own, .. }): (&PosedStop, &StopWith)| {
+            let others = others(stop, &self.flange(&of, &stop.stated), &own.readings).into_iter();
+            let others = others.map(|readings| self.compared.candidate((&state, &origins), &stop.seen, readings));
+            let all: Option<Vec<_>> = std::iter::once(Some(own.clone())).chain(others).collect();
             all.map(Stop::of)
         };
         let all: Option<Vec<Stop>> = self.stops.par_iter().zip(&tried.stops).map(one).collect();
@@ -313,25 +308,24 @@ impl<'a> Search<'a> {
     fn at<'r>(&self, tool: Vector6<f64>, from: impl Fn(usize) -> &'r [f64] + Sync) -> Option<Tried> {
         let stops = self.stops_with(&tool, from)?;
         let mut known = Knowledge::of_priors(&self.compared.prior);
-        stops.iter().for_each(|stop| known.add((&stop.g, &stop.e), 1.0));
-        let x = known.factor()?.solve(&known.rhs);
-        let cost = known.squares - known.rhs.dot(&x);
-        Some(Tried { tool, stops, known, x, cost })
+        stops.iter().for_each(|stop| known.add(&stop.candidate, 1.0));
+        Some(Tried { tool, stops, least: known.least()? })
     }
 
     /// Residuals of all stops with a tool or frame beside the one that was tried; those that either does not reach as they were there.
     fn residuals_beside(&self, tried: &Tried, tool: &Vector6<f64>) -> Option<Vec<f64>> {
-        let moved = self.stops_with(tool, |k| &tried.stops[k].readings)?;
+        let moved = self.stops_with(tool, |k| tried.readings(k))?;
         let of = |(moved, own): (&StopWith, &StopWith)| {
             let both = moved.is_reached && own.is_reached;
-            if both { moved.residual(&tried.x) } else { own.residual(&tried.x) }.data.as_vec().clone()
+            let candidate = if both { &moved.candidate } else { &own.candidate };
+            candidate.residual(&tried.least.x).data.as_vec().clone()
         };
         Some(moved.iter().zip(&tried.stops).flat_map(of).collect())
     }
 
     /// Normal equations of the tool with `x` eliminated: information, and the gradient.
     fn reduced(&self, tried: &Tried) -> Option<(Matrix6<f64>, Vector6<f64>)> {
-        let own = tried.stops.iter().flat_map(|stop| stop.residual(&tried.x).data.as_vec().clone());
+        let own = tried.stops.iter().flat_map(|stop| stop.candidate.residual(&tried.least.x).data.as_vec().clone());
         let r = DVector::from_vec(own.collect());
         let mut j = DMatrix::zeros(r.len(), 6);
         for k in 0..6 {
@@ -340,13 +334,13 @@ impl<'a> Search<'a> {
             let beside = DVector::from_vec(self.residuals_beside(tried, &moved)?);
             j.set_column(k, &((beside - &r) / DIFFERENCE));
         }
-        let mut coupled = DMatrix::zeros(tried.x.len(), 6);
+        let mut coupled = DMatrix::zeros(tried.least.x.len(), 6);
         let mut row = 0;
-        for StopWith { g, .. } in &tried.stops {
+        for g in tried.stops.iter().map(|stop| &stop.candidate.g) {
             coupled.gemm_tr(1.0, g, &j.rows(row, g.nrows()), 1.0);
             row += g.nrows();
         }
-        let information = j.transpose() * &j - coupled.transpose() * tried.known.factor()?.solve_many(&coupled);
+        let information = j.transpose() * &j - coupled.transpose() * tried.least.factor.solve_many(&coupled);
         let information = Matrix6::from_column_slice(information.as_slice());
         Some((
             0.5 * (information + information.transpose()),
@@ -362,9 +356,9 @@ impl<'a> Search<'a> {
             while damping < MOST_DAMPING {
                 let damped = information + Matrix6::from_diagonal(&information.diagonal().map(|d| damping * d + 1.0));
                 let step = damped.cholesky()?.solve(&-gradient);
-                match self.at(tried.tool + step, |k| &tried.stops[k].readings).filter(|next| next.cost < tried.cost) {
+                match self.at(tried.tool + step, |k| tried.readings(k)).filter(|next| next.cost() < tried.cost()) {
                     Some(next) => {
-                        gained = 1.0 - next.cost / tried.cost;
+                        gained = 1.0 - next.cost() / tried.cost();
                         tried = next;
                         damping *= 0.1;
                         break;
@@ -386,7 +380,7 @@ impl<'a> Search<'a> {
         // What nothing tells is a turn about the last axis, which the zero of that joint takes.
         let inverse = eigenvalues.map(|v| 1.0 / v.max(1.0));
         let covariance = eigenvectors * Matrix6::from_diagonal(&inverse) * eigenvectors.transpose();
-        let scatter = tried.cost / self.equations as f64;
+        let scatter = tried.cost() / self.equations as f64;
         Some(covariance.diagonal().fixed_rows::<3>(0).map(|v| (scatter * v).sqrt()))
     }
 }
