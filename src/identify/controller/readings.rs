@@ -146,6 +146,7 @@ fn misread(way: ReadAs, poses: &ControllerPoses, place: String, fit: &str) -> Op
 const SEEN_FITS: &str = "what was seen at the stops fits";
 
 /// An arm whose postures are looked for.
+#[derive(Clone)]
 pub(super) struct Arm {
     robot: Robot,
     limits: Vec<(f64, f64)>,

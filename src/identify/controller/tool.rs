@@ -54,8 +54,9 @@ pub(in crate::identify) fn tool_in_poses(
     hold: impl FnOnce(&mut Adjustment) -> Result<()>,
 ) -> Option<ToolInPoses> {
     let best = Compared::with("tool in poses", robot, (series, limits), hold, |compared| {
-        let searches = [PosesOf::Tool, PosesOf::Frame].map(|of| Search::new(compared, series, robot, of));
-        let found = searches.into_iter().flatten().filter_map(|search| search.told(limits));
+        let search = Search::new(compared, series, robot)?.started()?;
+        let of = |of: PosesOf| Search { of, ..search.clone() }.told(limits);
+        let found = [PosesOf::Tool, PosesOf::Frame].into_iter().filter_map(of);
         found.min_by(|a, b| a.1.cost().total_cmp(&b.1.cost()))
     });
     let (of, best, sigma_m, gain) = best?;
@@ -73,6 +74,7 @@ struct PosedStop {
     stated: Pose,
 }
 
+#[derive(Clone)]
 struct Search<'a> {
     compared: &'a Compared,
     of: PosesOf,
@@ -82,6 +84,10 @@ struct Search<'a> {
     equations: usize,
     /// Every coordinate of a stop that is out of reach.
     unreached: f64,
+    /// The least cost without a tool.
+    without: f64,
+    /// Readings of all stops to start from; none where the stops fit as they are: there their postures are right.
+    families: Vec<Vec<Vec<f64>>>,
 }
 
 /// A stop with a tool or a frame.
@@ -149,7 +155,7 @@ fn families(stops: &[PosedStop]) -> Vec<Vec<Vec<f64>>> {
 }
 
 impl<'a> Search<'a> {
-    fn new(compared: &'a Compared, series: &[MeasuredSeries], robot: &Robot, of: PosesOf) -> Option<Self> {
+    fn new(compared: &'a Compared, series: &[MeasuredSeries], robot: &Robot) -> Option<Self> {
         // With another tool the robot may have been where its limits do not let it with this one.
         let arm = Arm::beyond_limits(&robot.chain);
         let problem = &compared.adjustment.problem;
@@ -169,7 +175,33 @@ impl<'a> Search<'a> {
         };
         let stops: Vec<PosedStop> = spread(all.len(), MOST_STOPS).map(posed).collect();
         let equations = stops.iter().map(|stop| 6 * stop.seen.images.len()).sum();
-        (!stops.is_empty()).then_some(Self { compared, of, arm, stops, equations, unreached: 0.0 })
+        let (of, unreached, without, families) = (PosesOf::Tool, 0.0, 0.0, Vec::new());
+        (!stops.is_empty()).then_some(Self { compared, of, arm, stops, equations, unreached, without, families })
+    }
+
+    /// What is known without a tool, and so without a frame.
+    fn started(mut self) -> Option<Self> {
+        let none = self.at(Vector6::zeros(), |k| &self.stops[k].postures[0])?;
+        // Out of reach is worse than a stop usually is without a tool.
+        self.unreached = (2.0 * none.cost() / self.equations as f64).sqrt();
+        self.without = none.cost();
+        let fits = none.cost() < self.equations as f64;
+        if !fits {
+            self.look_all_over();
+            let with_family = self.families.par_iter().filter_map(|family| self.cost_without(family));
+            self.without = with_family.collect::<Vec<f64>>().into_iter().fold(self.without, f64::min);
+        }
+        Some(self)
+    }
+
+    /// All postures of the stops, and their families.
+    fn look_all_over(&mut self) {
+        let Self { stops, arm, .. } = self;
+        stops.par_iter_mut().for_each(|stop| {
+            let others = arm.others(&stop.stated, &stop.postures[0]);
+            stop.postures.extend(others);
+        });
+        self.families = families(&self.stops);
     }
 
     /// What the flange carries stands as it was on the tool, what is fixed as it was in the frame.
@@ -215,18 +247,14 @@ impl<'a> Search<'a> {
     }
 
     /// The best one, with the sigma of its place (m) and the gain of the log likelihood, if it is told.
-    fn told(mut self, limits: &Limits) -> Option<(PosesOf, Tried, Vector3<f64>, f64)> {
+    fn told(&self, limits: &Limits) -> Option<(PosesOf, Tried, Vector3<f64>, f64)> {
         let taken: Vec<Vec<f64>> = self.stops.iter().map(|stop| stop.postures[0].clone()).collect();
-        let none = self.at(Vector6::zeros(), |k| &taken[k])?;
-        // Out of reach is worse than a stop usually is without a tool.
-        self.unreached = (2.0 * none.cost() / self.equations as f64).sqrt();
         let along = STARTS_M.map(|z| (Vector6::new(0.0, 0.0, z, 0.0, 0.0, 0.0), taken.clone()));
-        // Where stops fit as they are, their postures are right.
-        let (without, best) = match none.cost() < self.equations as f64 {
-            true => (none.cost(), self.all_least(along.into(), |tried| tried).into_iter().next()?),
+        let best = match self.families.is_empty() {
+            true => self.all_least(along.into(), |tried| tried).into_iter().next()?,
             false => self.best_of_postures(along)?,
         };
-        let gain = 0.5 * self.equations as f64 * (without.min(none.cost()) / best.cost()).ln();
+        let gain = 0.5 * self.equations as f64 * (self.without / best.cost()).ln();
         tracing::debug!(of = ?self.of, gain, left = best.cost(), at = ?best.tool.as_slice(), "tool in poses");
         let sigma_m = self.sigma_m(&best)?;
         let far_m = best.tool.fixed_rows::<3>(0).norm();
@@ -242,32 +270,27 @@ impl<'a> Search<'a> {
         found
     }
 
-    /// The best one with any postures, from these starts and from all families; and the least cost without a tool, with any postures, too.
-    fn best_of_postures(&mut self, along: [Start; 3]) -> Option<(f64, Tried)> {
-        let Self { stops, arm, .. } = self;
-        stops.par_iter_mut().for_each(|stop| {
-            let others = arm.others(&stop.stated, &stop.postures[0]);
-            stop.postures.extend(others);
-        });
-        let families = families(&self.stops);
-        let from_known =
-            |stop: &PosedStop, flange: &Pose, own: &[f64]| self.arm.reached_from(&stop.postures, flange, own);
-        let without = families.par_iter().filter_map(|family| self.without(family, &from_known));
-        let without = without.collect::<Vec<f64>>().into_iter().fold(f64::INFINITY, f64::min);
-        let of_families = families.into_iter().map(|family| (Vector6::zeros(), family));
+    /// The best one with any postures, from these starts and from all families.
+    fn best_of_postures(&self, along: [Start; 3]) -> Option<Tried> {
+        let of_families = self.families.iter().map(|family| (Vector6::zeros(), family.clone()));
         let starts: Vec<Start> = along.into_iter().chain(of_families).collect();
-        let mut found = self.all_least(starts, |tried| self.settled(tried, from_known));
+        let mut found = self.all_least(starts, |tried| self.settled(tried, self.others_near()));
         found.truncate(RECHOSEN);
         let from_all = |_: &PosedStop, flange: &Pose, own: &[f64]| self.arm.others(flange, own);
         let found = found.into_iter().map(|tried| self.settled(tried, from_all));
-        Some((without, found.min_by(|a, b| a.cost().total_cmp(&b.cost()))?))
+        found.min_by(|a, b| a.cost().total_cmp(&b.cost()))
+    }
+
+    /// Looked for from the postures that a stop has without a tool.
+    fn others_near(&self) -> impl Others {
+        |stop: &PosedStop, flange: &Pose, own: &[f64]| self.arm.reached_from(&stop.postures, flange, own)
     }
 
     /// The cost without a tool, from a family of postures, each stop in the one that all others predict best.
-    fn without(&self, family: &[Vec<f64>], others: &impl Others) -> Option<f64> {
+    fn cost_without(&self, family: &[Vec<f64>]) -> Option<f64> {
         let mut tried = self.at(Vector6::zeros(), |k| &family[k])?;
         for _ in 0..RECHOICES {
-            let Some(readings) = self.rechosen(&tried, others) else { break };
+            let Some(readings) = self.rechosen(&tried, &self.others_near()) else { break };
             tried = self.at(Vector6::zeros(), |k| &readings[k])?;
         }
         Some(tried.cost())
