@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
-use super::scene::Scene;
+use super::scene::{PlacedScene, Scene};
 use super::setting::Setting;
 use super::viewpoint::{ViewRange, Viewpoint};
 use super::visibility::{VisibilityLimits, seen_markers};
@@ -218,11 +218,12 @@ impl<'a> Search<'a> {
         }
         tally.out_of_reach = usize::from(solutions.is_empty());
         let before = solutions.len();
-        solutions.retain(|q| scene.collision(q, placement).is_none());
-        tally.colliding = before - solutions.len();
-        let free = solutions.len();
-        let made = solutions.into_iter().map(|readings| Candidate {
-            seen: self.unhidden(&readings, (placement, &plate_from_camera), &seen),
+        let placed = solutions.into_iter().map(|readings| (scene.at(&readings), readings));
+        let free: Vec<_> = placed.filter(|(placed, _)| placed.collision(placement).is_none()).collect();
+        tally.colliding = before - free.len();
+        let count = free.len();
+        let made = free.into_iter().map(|(placed, readings)| Candidate {
+            seen: self.unhidden(&placed, (placement, &plate_from_camera), &seen),
             posture: posture(&readings, limits),
             readings,
             placement,
@@ -231,15 +232,20 @@ impl<'a> Search<'a> {
         });
         let made = made.filter(|c| options.sight.allow(&setting.plate, &camera_from_plate, &c.seen));
         let made: Vec<Candidate> = made.collect();
-        tally.hidden = free - made.len();
+        tally.hidden = count - made.len();
         (made, tally)
     }
 
-    /// Those of the markers (indices) before which nothing stands at these readings.
-    fn unhidden(&self, readings: &[f64], (placement, plate_from_camera): (usize, &Pose), seen: &[usize]) -> Vec<usize> {
+    /// Those of the markers (indices) before which nothing stands.
+    fn unhidden(
+        &self,
+        placed: &PlacedScene,
+        (placement, plate_from_camera): (usize, &Pose),
+        seen: &[usize],
+    ) -> Vec<usize> {
         let Self { setting, scene, .. } = self;
         let base_from_plate = setting.base_from_plate(plate_from_camera, placement);
-        let in_sight = scene.in_sight(readings, base_from_plate.transform(&plate_from_camera.translation));
+        let in_sight = placed.in_sight(base_from_plate.transform(&plate_from_camera.translation));
         // What is no higher above the plate carries it.
         let over_plate = |k: usize| {
             let marker = setting.plate.markers[k].position_m;

@@ -236,54 +236,16 @@ impl Scene {
         &self.capsules
     }
 
+    /// With the robot at these readings.
+    pub fn at(&self, readings: &[f64]) -> PlacedScene<'_> {
+        let links = self.robot.link_poses(readings);
+        let placed = |c: &Capsule| c.ends_m.map(|e| c.joint.map_or(e, |j| links[j].transform(&e)));
+        PlacedScene { ends: self.capsules.iter().map(placed).collect(), scene: self, links }
+    }
+
     /// What comes too near at these readings with the plate at `placement`; `None` where nothing does.
     pub fn collision(&self, readings: &[f64], placement: usize) -> Option<String> {
-        let links = self.robot.link_poses(readings);
-        let ends: Vec<[Vector3<f64>; 2]> =
-            self.capsules.iter().map(|c| c.ends_m.map(|e| c.joint.map_or(e, |j| links[j].transform(&e)))).collect();
-        let near = |distance: f64, c: &Capsule, other: f64| distance < c.radius_m + other + self.clearance_m;
-        for &(a, b) in &self.pairs {
-            let distance = segment_distance_m([&ends[a][0], &ends[a][1]], [&ends[b][0], &ends[b][1]]);
-            if near(distance, &self.capsules[a], self.capsules[b].radius_m) {
-                return Some(format!("{} and {}", self.capsules[a].name, self.capsules[b].name));
-            }
-        }
-        let hit = |obstacle: &OrientedBox, ends: &[[Vector3<f64>; 2]], is_meant: &dyn Fn(usize) -> bool| {
-            let mut links = self.capsules.iter().zip(ends).filter(|(c, _)| is_meant(c.order));
-            links.find(|(c, e)| near(obstacle.distance_to_segment_m(&e[0], &e[1]), c, 0.0)).map(|(c, _)| c.name.clone())
-        };
-        let still_from_base = self.cell.map_or_else(Pose::identity, |cell| links[cell.entry].inverse());
-        let in_base = ends;
-        let ends: Vec<[Vector3<f64>; 2]> = in_base.iter().map(|e| e.map(|e| still_from_base.transform(&e))).collect();
-        let stands = self.cell.map_or(0, |cell| cell.order);
-        for (name, obstacle) in &self.boxes {
-            if let Some(link) = hit(obstacle, &ends, &|order| order != stands) {
-                return Some(format!("{link} and {name}"));
-            }
-        }
-        // What carries them touches them.
-        let plate = self.plates.get(placement).map(|p| ("plate", p));
-        for (name, obstacle) in self.on_base.iter().map(|camera| ("camera", camera)).chain(plate) {
-            if let Some(link) = hit(obstacle, &in_base, &|order| order > stands) {
-                return Some(format!("{link} and {name}"));
-            }
-        }
-        let table = self.table_z_m + self.clearance_m;
-        for (c, e) in self.capsules.iter().zip(&ends).filter(|(c, _)| c.order.abs_diff(stands) > FOOT) {
-            if e[0].z.min(e[1].z) - c.radius_m < table {
-                return Some(format!("{} and table", c.name));
-            }
-        }
-        if self.cell.is_some() {
-            let on_base = self.plates.get(placement).map(|p| ("plate", p)).into_iter();
-            for (name, carried) in on_base.chain(self.on_base.iter().map(|camera| ("camera", camera))) {
-                if let Some(other) = self.still_near(&carried.placed(&still_from_base), table) {
-                    return Some(format!("{name} and {other}"));
-                }
-            }
-        }
-        let carried = self.plates_in_hand.get(placement)?.placed(&(still_from_base * *links.last()?));
-        self.plate_in_hand_collides(&carried, &ends, table)
+        self.at(readings).collision(placement)
     }
 
     /// Height above the face of a plate up to which something is what the plate lies on or in, m.
@@ -291,24 +253,30 @@ impl Scene {
         HALF_PLATE_M + self.clearance_m
     }
 
-    /// What may stand between an eye and what it looks at, at these readings: boxes, and the links but the two that carry camera or plate.
-    pub fn in_sight(&self, readings: &[f64], eye_m: Vector3<f64>) -> InSight {
-        let links = self.robot.link_poses(readings);
-        let base_from_still = self.cell.map_or_else(Pose::identity, |cell| links[cell.entry]);
-        // What the eye is in is the camera.
-        let boxes = self.boxes.iter().map(|(_, b)| b.placed(&base_from_still)).filter(|b| b.distance_m(&eye_m) > 0.0);
-        let last = self.capsules.iter().map(|c| c.order).max().unwrap_or(0);
-        let carried = self.capsules.iter().filter(|c| c.order + 1 < last);
-        let placed = |c: &Capsule| (c.ends_m.map(|e| c.joint.map_or(e, |j| links[j].transform(&e))), c.radius_m);
-        let is_apart = |(ends, radius_m): &([Vector3<f64>; 2], f64)| {
-            segment_distance_m([&eye_m, &eye_m], [&ends[0], &ends[1]]) > *radius_m
-        };
-        InSight { eye_m, boxes: boxes.collect(), links: carried.map(placed).filter(is_apart).collect() }
+    /// True for a capsule that comes too near to something of a radius at a distance, m.
+    fn is_near(&self, distance: f64, capsule: &Capsule, radius_m: f64) -> bool {
+        distance < capsule.radius_m + radius_m + self.clearance_m
+    }
+
+    /// Height below which nothing may be, where what stands still is.
+    fn lowest_m(&self) -> f64 {
+        self.table_z_m + self.clearance_m
+    }
+
+    /// What joints carry with the base: plate or camera.
+    fn on_base(&self, placement: usize) -> impl Iterator<Item = (&str, &OrientedBox)> {
+        let plate = self.plates.get(placement).map(|plate| ("plate", plate));
+        self.on_base.iter().map(|camera| ("camera", camera)).chain(plate)
+    }
+
+    /// Order of the outermost capsule.
+    fn outermost(&self) -> usize {
+        self.capsules.iter().map(|c| c.order).max().unwrap_or(0)
     }
 
     /// The table or the box that a carried body comes too near to.
-    fn still_near(&self, body: &OrientedBox, table: f64) -> Option<&str> {
-        if body.corners().iter().any(|c| c.z < table) {
+    fn still_near(&self, body: &OrientedBox) -> Option<&str> {
+        if body.corners().iter().any(|c| c.z < self.lowest_m()) {
             return Some("table");
         }
         // Corners and middle against boxes: a plate is thin, and a box it would cut through elsewhere reaches the arm first.
@@ -321,17 +289,6 @@ impl Scene {
         self.boxes.iter().find(|(_, b)| hit(b)).map(|(name, _)| name.as_str())
     }
 
-    /// The plate in the hand against table, boxes and all links but the two that carry it.
-    fn plate_in_hand_collides(&self, plate: &OrientedBox, ends: &[[Vector3<f64>; 2]], table: f64) -> Option<String> {
-        let last = self.capsules.iter().map(|c| c.order).max()?;
-        for (c, e) in self.capsules.iter().zip(ends).filter(|(c, _)| c.order + 1 < last) {
-            if plate.distance_to_segment_m(&e[0], &e[1]) < c.radius_m + self.clearance_m {
-                return Some(format!("{} and plate", c.name));
-            }
-        }
-        self.still_near(plate, table).map(|other| format!("plate and {other}"))
-    }
-
     /// True where the straight way between two joint vectors is free, checked every `step` (rad or m of any joint).
     pub fn way_is_free(&self, from: &[f64], to: &[f64], placement: usize, step: f64) -> bool {
         let longest = from.iter().zip(to).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
@@ -341,6 +298,129 @@ impl Scene {
             let at: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + t * (b - a)).collect();
             self.collision(&at, placement).is_none()
         })
+    }
+}
+
+/// A scene with the robot at some readings.
+#[derive(Debug)]
+pub struct PlacedScene<'a> {
+    scene: &'a Scene,
+    links: Vec<Pose>,
+    /// Ends of the capsules in the base frame, m.
+    ends: Vec<Ends>,
+}
+
+/// Of a capsule, m.
+type Ends = [Vector3<f64>; 2];
+
+impl PlacedScene<'_> {
+    /// What comes too near with the plate at `placement`; `None` where nothing does.
+    pub fn collision(&self, placement: usize) -> Option<String> {
+        let of_links = self.links_collide();
+        if of_links.is_some() {
+            return of_links;
+        }
+        let still_from_base = self.base_from_still().map_or_else(Pose::identity, |pose| pose.inverse());
+        let in_still: Vec<Ends> = self.ends.iter().map(|e| e.map(|e| still_from_base.transform(&e))).collect();
+        self.box_collides(&in_still)
+            .or_else(|| self.carried_meets_link(placement))
+            .or_else(|| self.table_collides(&in_still))
+            .or_else(|| self.carried_meets_still(placement, &still_from_base))
+            .or_else(|| self.plate_in_hand_collides(placement, &still_from_base, &in_still))
+    }
+
+    /// What may stand between an eye and what it looks at: boxes, and the links but the two that carry camera or plate.
+    pub fn in_sight(&self, eye_m: Vector3<f64>) -> InSight {
+        let base_from_still = self.base_from_still().unwrap_or_else(Pose::identity);
+        // What the eye is in is the camera.
+        let boxes = self.scene.boxes.iter().map(|(_, b)| b.placed(&base_from_still));
+        let boxes = boxes.filter(|b| b.distance_m(&eye_m) > 0.0).collect();
+        let last = self.scene.outermost();
+        let carried = self.capsules().filter(|(c, _)| c.order + 1 < last);
+        let is_apart =
+            |(ends, radius_m): &(Ends, f64)| segment_distance_m([&eye_m, &eye_m], [&ends[0], &ends[1]]) > *radius_m;
+        InSight { eye_m, boxes, links: carried.map(|(c, ends)| (*ends, c.radius_m)).filter(is_apart).collect() }
+    }
+
+    /// Where what stands still is, where the base does not.
+    fn base_from_still(&self) -> Option<Pose> {
+        self.scene.cell.map(|cell| self.links[cell.entry])
+    }
+
+    fn capsules(&self) -> impl Iterator<Item = (&Capsule, &Ends)> {
+        self.scene.capsules.iter().zip(&self.ends)
+    }
+
+    /// Links and camera with each other.
+    fn links_collide(&self) -> Option<String> {
+        let is_near = |&&(a, b): &&(usize, usize)| {
+            let [one, other] = [&self.scene.capsules[a], &self.scene.capsules[b]];
+            let [[start, end], other_ends] = [&self.ends[a], &self.ends[b]];
+            let distance = segment_distance_m([start, end], [&other_ends[0], &other_ends[1]]);
+            self.scene.is_near(distance, one, other.radius_m)
+        };
+        let (a, b) = self.scene.pairs.iter().find(is_near)?;
+        Some(format!("{} and {}", self.scene.capsules[*a].name, self.scene.capsules[*b].name))
+    }
+
+    /// The first link with these ends, of those whose order is meant, that comes too near to an obstacle.
+    fn hit(&self, obstacle: &OrientedBox, ends: &[Ends], is_meant: impl Fn(usize) -> bool) -> Option<&str> {
+        let mut links = self.scene.capsules.iter().zip(ends).filter(|(c, _)| is_meant(c.order));
+        let near =
+            |(c, e): &(&Capsule, &Ends)| self.scene.is_near(obstacle.distance_to_segment_m(&e[0], &e[1]), c, 0.0);
+        links.find(near).map(|(c, _)| c.name.as_str())
+    }
+
+    /// Order of what the arm stands on.
+    fn stands(&self) -> usize {
+        self.scene.cell.map_or(0, |cell| cell.order)
+    }
+
+    fn box_collides(&self, in_still: &[Ends]) -> Option<String> {
+        let stands = self.stands();
+        let boxes = self.scene.boxes.iter();
+        let hit = |(name, obstacle): &(String, OrientedBox)| {
+            let link = self.hit(obstacle, in_still, |order| order != stands)?;
+            Some(format!("{link} and {name}"))
+        };
+        boxes.into_iter().find_map(hit)
+    }
+
+    fn carried_meets_link(&self, placement: usize) -> Option<String> {
+        // What carries them touches them.
+        let stands = self.stands();
+        let hit = |(name, obstacle): (&str, &OrientedBox)| {
+            let link = self.hit(obstacle, &self.ends, |order| order > stands)?;
+            Some(format!("{link} and {name}"))
+        };
+        self.scene.on_base(placement).find_map(hit)
+    }
+
+    fn table_collides(&self, in_still: &[Ends]) -> Option<String> {
+        let (stands, lowest) = (self.stands(), self.scene.lowest_m());
+        let mut links = self.scene.capsules.iter().zip(in_still).filter(|(c, _)| c.order.abs_diff(stands) > FOOT);
+        let (link, _) = links.find(|(c, e)| e[0].z.min(e[1].z) - c.radius_m < lowest)?;
+        Some(format!("{} and table", link.name))
+    }
+
+    fn carried_meets_still(&self, placement: usize, still_from_base: &Pose) -> Option<String> {
+        self.scene.cell?;
+        let near = |(name, carried): (&str, &OrientedBox)| {
+            let other = self.scene.still_near(&carried.placed(still_from_base))?;
+            Some(format!("{name} and {other}"))
+        };
+        self.scene.on_base(placement).find_map(near)
+    }
+
+    /// The plate in the hand against table, boxes and all links but the two that carry it.
+    fn plate_in_hand_collides(&self, placement: usize, still_from_base: &Pose, in_still: &[Ends]) -> Option<String> {
+        let still_from_tip = still_from_base * self.links.last()?;
+        let plate = self.scene.plates_in_hand.get(placement)?.placed(&still_from_tip);
+        let last = self.scene.outermost();
+        if let Some(link) = self.hit(&plate, in_still, |order| order + 1 < last) {
+            return Some(format!("{link} and plate"));
+        }
+        self.scene.still_near(&plate).map(|other| format!("plate and {other}"))
     }
 }
 
