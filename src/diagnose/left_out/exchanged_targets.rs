@@ -1,9 +1,10 @@
 //! Are two targets of a tracker in the place of each other at some stops?
 
-use super::shifted_measurements::{is_out, misfit};
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::shifted_measurements::{is_out, misfit, usual_misfit};
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
-use crate::linalg::median;
 use crate::problem::{Adjustment, InstrumentKind, stop_name};
 
 /// Most stops that are named.
@@ -28,6 +29,7 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedTa
     let all = &problem.body_measurements;
     let of_tracker = |k: usize| problem.instruments[all[k].instrument].kind == InstrumentKind::Tracker;
     let out: Vec<usize> = (0..all.len()).filter(|&k| of_tracker(k) && is_out(&all[k])).collect();
+    let usual = usual_misfits(adjustment, out.iter().map(|&k| all[k].instrument).collect());
     let mut found: Vec<ExchangedTargets> = Vec::new();
     for (at, &one) in out.iter().enumerate() {
         let is_beside = |other: &usize| {
@@ -35,7 +37,10 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedTa
             a == b && all[one].body != all[*other].body
         };
         for &other in out[at + 1..].iter().filter(|other| is_beside(other)) {
-            let Some(misfit) = exchanged(adjustment, [one, other], setting) else { continue };
+            let usual = usual.get(&all[one].instrument).copied();
+            let Some(misfit) = usual.and_then(|usual| exchanged(adjustment, [one, other], usual, setting)) else {
+                continue;
+            };
             let stop = stop_name(setting.series, all[one].read);
             let tracker = problem.instruments[all[one].instrument].name.clone();
             let mut targets = [one, other].map(|k| problem.bodies[all[k].body].clone());
@@ -52,11 +57,19 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedTa
     found
 }
 
+/// Of every tracker, m + rad.
+fn usual_misfits(adjustment: &Adjustment, trackers: BTreeSet<usize>) -> BTreeMap<usize, f64> {
+    let rows = adjustment.problem.body_measurements.iter();
+    let of = |tracker: usize| {
+        let own = rows.clone().filter(|row| row.instrument == tracker);
+        Some((tracker, usual_misfit(adjustment, own)?))
+    };
+    trackers.into_iter().filter_map(of).collect()
+}
+
 /// How well both rows fit in the place of each other, where they do.
-fn exchanged(adjustment: &Adjustment, [one, other]: [usize; 2], setting: &CheckContext) -> Option<f64> {
+fn exchanged(adjustment: &Adjustment, [one, other]: [usize; 2], usual: f64, setting: &CheckContext) -> Option<f64> {
     let all = &adjustment.problem.body_measurements;
-    let used = all.iter().filter(|m| m.rejected.is_none() && m.instrument == all[one].instrument);
-    let usual = median(used.filter_map(|m| misfit(adjustment, m, (m, m.stop))))?;
     let fits = |row: usize, place: usize| {
         let own = misfit(adjustment, &all[row], (&all[row], all[row].stop))?;
         let there = misfit(adjustment, &all[row], (&all[place], all[place].stop))?;

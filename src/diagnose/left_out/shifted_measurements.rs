@@ -57,6 +57,15 @@ pub(super) fn misfit(
     })
 }
 
+/// How far rows in use usually are from where the readings of their stops have them, m + rad.
+pub(super) fn usual_misfit<'r>(
+    adjustment: &Adjustment,
+    rows: impl IntoIterator<Item = &'r BodyMeasurement>,
+) -> Option<f64> {
+    let used = rows.into_iter().filter(|row| row.rejected.is_none());
+    median(used.filter_map(|row| misfit(adjustment, row, (row, row.stop))))
+}
+
 /// True of a row that was left out for not fitting.
 pub(super) const fn is_out(row: &BodyMeasurement) -> bool {
     matches!(row.rejected, Some(BodyRejection::Residual { .. } | BodyRejection::JointError { .. }))
@@ -81,8 +90,7 @@ impl Group<'_> {
     /// The run of rows that were left out and fit those of a neighbour, in one direction and order of the stops.
     fn shifted(&self, setting: &CheckContext) -> Option<ShiftedMeasurements> {
         let problem = &self.adjustment.problem;
-        let used = (0..self.group.len()).filter(|row| self.measured(*row).rejected.is_none());
-        let usual = median(used.filter_map(|row| self.misfit(row, self.measured(row).stop)))?;
+        let usual = usual_misfit(self.adjustment, (0..self.group.len()).map(|row| self.measured(row)))?;
         let own: Vec<usize> = (0..self.group.len()).map(|row| self.measured(row).stop).collect();
         let orders = problem.orders_of_rows(&own);
         let ways = orders.iter().flat_map(|order| [true, false].map(|below| (order, below)));
