@@ -291,9 +291,9 @@ fn impossible(setting: &Setting, scene: &Scene, options: &CandidateOptions, tall
         return out_of_reach(setting, options, tally.out_of_reach);
     }
     if tally.hidden > tally.colliding {
-        return all_hidden(tally.hidden);
+        return all_hidden(tally);
     }
-    all_collide(setting, scene, options, tally.colliding)
+    all_collide(setting, scene, options, tally)
 }
 
 /// None of the `workable` views is in reach of the arm.
@@ -364,26 +364,32 @@ impl Foot {
     }
 }
 
-/// Every posture that reaches a workable view touches something.
-fn all_collide(setting: &Setting, scene: &Scene, options: &CandidateOptions, postures: usize) -> Error {
+/// Every posture that reaches a workable view touches something, or most of them do and nothing is seen in the others.
+fn all_collide(setting: &Setting, scene: &Scene, options: &CandidateOptions, tally: &CandidateCounts) -> Error {
     let example = (0..64).find_map(|k| {
         let mut rng = ChaCha8Rng::seed_from_u64(k);
         let limits = narrowed_limits(setting, options.limit_margin);
         scene.collision(&random_readings(&limits, &setting.robot.chain.reading_kinds, &mut rng), 0)
     });
-    let what = format!(
-        "all {postures} postures that reach a workable view collide{}",
-        example.map_or(String::new(), |e| format!(" (for example {e})"))
-    );
+    let example = example.map_or(String::new(), |e| format!(" (for example {e})"));
+    let CandidateCounts { colliding, hidden, .. } = *tally;
+    let what = match hidden {
+        0 => format!("all {colliding} postures that reach a workable view collide{example}"),
+        _ => format!(
+            "of {} postures that reach a workable view {colliding} collide{example}, and in {hidden} a box or the arm hides the plate from the camera",
+            colliding + hidden
+        ),
+    };
     let remedy = "check boxes and table (--box, --table-z-m), allow less clearance (--clearance-mm) or thinner links \
                   (--link-radius-mm), or put the plate elsewhere";
     Error::new(Code::PlanCollides, "plan: collisions", what, remedy)
 }
 
-/// In every posture that reaches a workable view something stands before the plate.
-fn all_hidden(postures: usize) -> Error {
+/// In most postures that reach a workable view something stands before the plate, and the others collide.
+fn all_hidden(CandidateCounts { colliding, hidden, .. }: &CandidateCounts) -> Error {
     let what = format!(
-        "in {postures} postures that reach a workable view and touch nothing, a box or the arm hides the plate from the camera"
+        "of {} postures that reach a workable view {colliding} collide, and in {hidden} a box or the arm hides the plate from the camera",
+        colliding + hidden
     );
     let remedy = "check the boxes (--box) and where plate and camera are (--plate-pose, --hand-camera), or ask for fewer markers (--markers)";
     Error::new(Code::PlanViewless, "plan: sight", what, remedy)
