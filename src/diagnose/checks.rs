@@ -26,7 +26,9 @@ pub enum Stage {
     FreePoses(fn(&Problem, &CheckContext) -> Vec<Finding>),
     /// After wrong pairs and outliers were left out.
     LeftOut(fn(&Adjustment, &CheckContext) -> Vec<Finding>),
-    /// Then, with the readings that wrongly paired images fit.
+    /// Then, beside what the checks above have found.
+    BesideLeftOut(fn(&Adjustment, &[Vec<Finding>], &CheckContext) -> Vec<Finding>),
+    /// With the readings that wrongly paired images fit.
     WrongPairs(fn(&Adjustment, &ReadingCircles, &CheckContext) -> Vec<Finding>),
     /// After the fit, with the accuracy on images that it had not seen.
     Fit(fn(&Fit, &Accuracy, &CheckContext) -> Vec<Finding>),
@@ -175,7 +177,7 @@ pub const CHECKS: &[Check] = &[
     check("shifted_measurements", Stage::LeftOut(|a, s| found(shifted_measurements::check(a, s)))),
     check("shifted_readings", Stage::WrongPairs(|a, r, s| found(shifted_readings::check(a, r, s)))),
     check("repeated_measurements", Stage::LeftOut(|a, s| found(repeated_measurements::check(a, s)))),
-    check("left_out_bodies", Stage::LeftOut(|a, s| found(left_out_bodies::check(a, s)))),
+    check("left_out_bodies", Stage::BesideLeftOut(|a, f, s| found(left_out_bodies::check(a, f, s)))),
     check("measurement_scatter", Stage::Fit(|a, b, s| found(measurement_scatter::check(a, b, s)))),
     check("left_out_observations", Stage::LeftOut(|a, s| found(left_out_observations::check(a, s)))),
     check("mirror_image", Stage::Fit(|a, b, s| found(mirror_image::check(a, b, s)))),
@@ -243,9 +245,9 @@ impl<'a> Diagnosis<'a> {
     }
 
     /// Runs the checks of a stage in their order.
-    fn run(&mut self, of_stage: impl Fn(&Stage, &CheckContext) -> Option<Vec<Finding>>) {
+    fn run(&mut self, of_stage: impl Fn(&Stage, &[Vec<Finding>], &CheckContext) -> Option<Vec<Finding>>) {
         for (row, check) in CHECKS.iter().enumerate() {
-            let Some(mut found) = of_stage(&check.stage, &self.setting) else { continue };
+            let Some(mut found) = of_stage(&check.stage, &self.found[..row], &self.setting) else { continue };
             found.retain(|f| !self.is_explained(f));
             self.found[row] = found;
         }
@@ -260,7 +262,7 @@ impl<'a> Diagnosis<'a> {
 
     /// Checks of the stand-alone camera poses.
     pub fn after_free_poses(&mut self, problem: &Problem) {
-        self.run(|stage, setting| match stage {
+        self.run(|stage, _, setting| match stage {
             Stage::FreePoses(check) => Some(check(problem, setting)),
             _ => None,
         });
@@ -274,8 +276,9 @@ impl<'a> Diagnosis<'a> {
         let mut own = Self::new(setting);
         own.after_free_poses(&adjustment.problem);
         let circles = ReadingCircles::of(&adjustment.problem);
-        own.run(|stage, setting| match stage {
+        own.run(|stage, above, setting| match stage {
             Stage::LeftOut(check) => Some(check(adjustment, setting)),
+            Stage::BesideLeftOut(check) => Some(check(adjustment, above, setting)),
             Stage::WrongPairs(check) => Some(check(adjustment, &circles, setting)),
             _ => None,
         });
@@ -284,7 +287,7 @@ impl<'a> Diagnosis<'a> {
 
     /// Checks of the fit.
     pub fn after_fit(&mut self, fit: &Fit, accuracy: &Accuracy) {
-        self.run(|stage, setting| match stage {
+        self.run(|stage, _, setting| match stage {
             Stage::Fit(check) => Some(check(fit, accuracy, setting)),
             _ => None,
         });
@@ -292,7 +295,7 @@ impl<'a> Diagnosis<'a> {
 
     /// Checks of how far the result can be trusted.
     pub fn after_uncertainty(&mut self, fit: &Fit, uncertainty: &Uncertainty, accuracy: &Accuracy) {
-        self.run(|stage, setting| match stage {
+        self.run(|stage, _, setting| match stage {
             Stage::Uncertainty(check) => Some(check(uncertainty, accuracy, setting)),
             Stage::Judged(check) => Some(check(fit, uncertainty, accuracy, setting)),
             _ => None,

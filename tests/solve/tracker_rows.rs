@@ -119,6 +119,12 @@ fn targets_in_the_rows_of_each_other_are_named_with_their_stops() {
         let named = found(&solution, Code::TargetsExchanged);
         assert_eq!(named.map_or_else(Vec::new, Finding::subjects), stops(at), "{:?}", solution.findings);
         assert_eq!(left_out(&solution).len(), 2 * at.len());
+        let explained = solution.findings.iter().find_map(|finding| match finding {
+            Finding::MeasurementsLeftOut(found) => Some(found.explained_by.iter().map(|(code, _)| *code).collect()),
+            _ => None,
+        });
+        let why = (!at.is_empty()).then(|| vec![Code::TargetsExchanged]);
+        assert_eq!(explained, why);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::diagnose::finding::Finding;
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::problem::{Adjustment, BodyRejection, stop_name};
@@ -18,11 +19,14 @@ pub struct MeasurementsLeftOut {
     pub all: usize,
     /// Of several trackers and places the one that all are of, where they are not few.
     pub all_of: Option<String>,
+    /// Findings that say why some of them do not fit, by code and place.
+    pub explained_by: Vec<(Code, String)>,
     /// Note, gate, or refusal where most are left out.
     pub weight: Weight,
 }
 
-pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<MeasurementsLeftOut> {
+/// Beside what is known of them.
+pub fn check(adjustment: &Adjustment, known: &[Vec<Finding>], setting: &CheckContext) -> Option<MeasurementsLeftOut> {
     let problem = &adjustment.problem;
     let (mut named, mut instruments) = (Vec::new(), BTreeSet::new());
     // What was written again and again has a finding of its own.
@@ -43,7 +47,15 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Option<Measurem
     };
     let is_one = instruments.len() == 1 && problem.instruments.len() > 1 && out >= setting.limits.moved_images;
     let all_of = instruments.first().filter(|_| is_one).map(|name| (*name).clone());
-    Some(MeasurementsLeftOut { named, all, all_of, weight })
+    let why = |found: &Finding| match found {
+        Finding::ExchangedTargets(found) => Some((found.code(), found.place())),
+        Finding::ShiftedMeasurements(found) => Some((found.code(), found.place())),
+        _ => None,
+    };
+    // A refusal stands alone.
+    let known = known.iter().flatten().filter(|_| weight != Weight::Refusal);
+    let explained_by = known.filter_map(why).collect();
+    Some(MeasurementsLeftOut { named, all, all_of, explained_by, weight })
 }
 
 impl Kind for MeasurementsLeftOut {
@@ -79,7 +91,12 @@ impl Kind for MeasurementsLeftOut {
 
     fn remedy(&self) -> String {
         let usual = "check joint_unit, the order and signs of the joints, that every row names its own stop, and that instrument and targets did not move";
+        let explained: Vec<String> =
+            self.explained_by.iter().map(|(code, place)| format!("{place} ({})", code.name())).collect();
         match &self.all_of {
+            _ if !explained.is_empty() => {
+                format!("do first what is said of {}; where others are left out, {usual}", explained.join("; "))
+            }
             Some(name) => format!(
                 "all are of {name}: did it move? Then give the rows before and after another name each; else {usual}"
             ),
