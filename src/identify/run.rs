@@ -39,8 +39,28 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
     let robot = model.robot_with(chain.clone(), options.harmonics);
     let series = &turns::settled(&robot, series, &options.limits);
     let rigid = RobotModel::Rigid.robot_with(chain.clone(), options.harmonics);
-    let (mut told, mut of_postures) = told_postures(&rigid, (series, Before::Nearest), options);
-    let mut chosen = choose(&chain, &told, options, &by_joint_fit)?;
+    let (mut told, of_postures) = told_postures(&rigid, (series, Before::Nearest), options);
+    let choose = |told: &[MeasuredSeries]| choose(&chain, told, options, &by_joint_fit);
+    let (chosen, of_postures) = with_postures_retold(&mut told, of_postures, choose, options)?;
+    let Chosen { fit, series: lensed, evidences, lenses, notices, .. } = chosen;
+    let mut solution = Solution { evidences, lenses, ..fit.judged(&lensed, options.estimator)? };
+    solution.findings.extend(notices.into_iter().map(Into::into));
+    solution.findings.extend(of_postures.map(|t| t.finding(series, &told).into()));
+    name_tool(&mut solution.findings, &rigid, &told, options);
+    name_tried_lenses(&mut solution);
+    let losses = lens_choice::losses(&solution.fit.adjustment, &solution.free_poses, series);
+    solution.findings.extend(losses.into_iter().map(Into::into));
+    Ok(Solution { options: options.clone(), ..solution })
+}
+
+/// What is `chosen` by the series as they are `told`, in rounds for as long as the identified robot tells other postures.
+fn with_postures_retold(
+    told: &mut [MeasuredSeries],
+    mut of_postures: Option<ChosenPostures>,
+    choose: impl Fn(&[MeasuredSeries]) -> Result<Chosen>,
+    options: &Options,
+) -> Result<(Chosen, Option<ChosenPostures>)> {
+    let mut chosen = choose(told)?;
     for _ in 0..RETELLINGS {
         // A wrong posture hides the joint terms: the robot that has all of them tells what the first model could not.
         let fitted = (chosen.series.as_slice(), Before::Fitted);
@@ -54,26 +74,23 @@ pub fn identify(chain: Chain, series: &[MeasuredSeries], options: &Options) -> R
         for (told, again) in told.iter_mut().zip(again) {
             (told.stops, told.postures) = (again.stops, again.postures);
         }
-        chosen = choose(&chain, &told, options, &by_joint_fit)?;
+        chosen = choose(told)?;
     }
-    let Chosen { fit, series: lensed, evidences, lenses, notices, .. } = chosen;
-    let mut solution = Solution { evidences, lenses, ..fit.judged(&lensed, options.estimator)? };
-    solution.findings.extend(notices.into_iter().map(Into::into));
-    solution.findings.extend(of_postures.map(|t| t.finding(series, &told).into()));
+    Ok((chosen, of_postures))
+}
+
+/// A tool or frame in the poses, in place of what follows from it.
+fn name_tool(findings: &mut Vec<Finding>, robot: &Robot, told: &[MeasuredSeries], options: &Options) {
     // What moved in the series fits with a tool or frame somewhat better, too.
     let moved = |f: &Finding| f.weight() == Weight::Gate && matches!(f, Finding::Displaced(_) | Finding::ZeroMoved(_));
-    if !solution.findings.iter().any(moved)
-        && let Some(tool) = of_tool(&rigid, &told, options)
-    {
-        let of_tool = told.iter().filter(|series| tool.series.contains(&series.name));
-        let mountings: Vec<&str> = of_tool.map(|series| series.mounting.as_str()).collect();
-        solution.findings.retain(|other| !follows_from_tool(other, &mountings));
-        solution.findings.push(tool.into());
+    if findings.iter().any(moved) {
+        return;
     }
-    name_tried_lenses(&mut solution);
-    let losses = lens_choice::losses(&solution.fit.adjustment, &solution.free_poses, series);
-    solution.findings.extend(losses.into_iter().map(Into::into));
-    Ok(Solution { options: options.clone(), ..solution })
+    let Some(tool) = of_tool(robot, told, options) else { return };
+    let of_tool = told.iter().filter(|series| tool.series.contains(&series.name));
+    let mountings: Vec<&str> = of_tool.map(|series| series.mounting.as_str()).collect();
+    findings.retain(|other| !follows_from_tool(other, &mountings));
+    findings.push(tool.into());
 }
 
 /// No finding tells to try a lens that was tried, and has less evidence.

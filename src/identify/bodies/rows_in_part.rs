@@ -46,10 +46,8 @@ pub(super) fn name_part(
     let misfits: Vec<f64> = own.iter().map(|seen| missed(seen, start)).collect();
     let bound = limits.suspicious_misfit;
     let far = misfits.iter().filter(|misfit| **misfit > bound).count();
-    let is_tracker = rows
-        .first()
-        .is_some_and(|k| problem.instruments[problem.body_measurements[*k].instrument].kind == InstrumentKind::Tracker);
-    if !is_tracker || far < limits.moved_images || state.robot.chain.pose_coordinates().is_some() {
+    let is_of_tracker = rows.first().is_some_and(|k| is_of_tracker(problem, *k));
+    if !is_of_tracker || far < limits.moved_images || state.robot.chain.pose_coordinates().is_some() {
         return Ok(());
     }
     let read = |(stops, below): (Vec<Option<usize>>, bool)| {
@@ -66,23 +64,30 @@ pub(super) fn name_part(
         // They are left out like single rows, and named by the fit.
         return Ok(());
     }
-    let instrument = &problem.instruments[problem.body_measurements[rows[0]].instrument];
-    let name = |k: usize| stop_name(series, problem.body_measurements[rows[k]].read);
-    let shifted = ShiftedPart {
-        first: name(part.rows.start),
-        last: name(part.rows.end - 1),
-        images: part.rows.len(),
-        to_the_end: part.rows.end == own.len(),
-    };
     let mistake = Mistake {
-        kind: MistakeKind::Rows { below, columns: Vec::new(), part: Some(shifted) },
-        of: instrument.place(),
+        kind: MistakeKind::Rows { below, columns: Vec::new(), part: Some(shifted(problem, series, &rows, &part.rows)) },
+        of: problem.instruments[problem.body_measurements[rows[0]].instrument].place(),
         misfit: lower_median(misfits),
         misfit_undone: Some(part.misfit),
         by_images: false,
         rows_of: rows_of_bodies(adjustment, measured, limits),
     };
     Err(Finding::from(mistake).refusal())
+}
+
+fn is_of_tracker(problem: &Problem, row: usize) -> bool {
+    problem.instruments[problem.body_measurements[row].instrument].kind == InstrumentKind::Tracker
+}
+
+/// The part of the rows, by the names of its stops.
+fn shifted(problem: &Problem, series: &[MeasuredSeries], rows: &[usize], part: &Range<usize>) -> ShiftedPart {
+    let name = |k: usize| stop_name(series, problem.body_measurements[rows[k]].read);
+    ShiftedPart {
+        first: name(part.start),
+        last: name(part.end - 1),
+        images: part.len(),
+        to_the_end: part.end == rows.len(),
+    }
 }
 
 /// For each row the stop of the next one, or the one before, in its series: of all stops, and of those that were measured.

@@ -234,7 +234,25 @@ fn fit(
     (aside, near, has_same_lenses): (&[usize], Option<&Adjustment>, bool),
     options: &Options,
 ) -> (Ended, Option<NoiseInformation>) {
-    let exact = options.joint_noise == JointNoise::Known(0.0);
+    set_noise(&mut start, near, options.joint_noise);
+    leave_all_out(&mut start.problem);
+    let components =
+        ComponentOptions { joint: options.joint_noise == JointNoise::Estimated, ..ComponentOptions::default() };
+    let outcome = match near {
+        Some(_) if has_same_lenses => estimate_components_near(start, &components),
+        Some(_) => estimate_components(start, &components),
+        None => estimate_components_from_above(start, &components),
+    };
+    let outcome = with_taken_back(outcome, free, aside, (&components, &options.limits));
+    let outcome = without_contradicting(outcome, &components, &options.limits);
+    let outcome = with_let_go(outcome, &components, &options.limits);
+    let outcome = with_agreeing(outcome, &components, &options.limits);
+    if components.joint { without_unidentified_noise(outcome, &components.settings) } else { (outcome.ended(), None) }
+}
+
+/// The noise of joints and displacements that the fit starts from.
+fn set_noise(start: &mut Adjustment, near: Option<&Adjustment>, joint_noise: JointNoise) {
+    let exact = joint_noise == JointNoise::Known(0.0);
     if exact {
         start.problem.noise.displacement.clear();
     }
@@ -242,37 +260,46 @@ fn fit(
     if let Some(solved) = near {
         start.start_near(solved, LEAST_FIRST_GUESS);
     }
-    if let JointNoise::Known(sigma) = options.joint_noise {
+    if let JointNoise::Known(sigma) = joint_noise {
         start.problem.noise.joint.iter_mut().flatten().for_each(|s| *s = sigma.max(f64::MIN_POSITIVE));
     }
-    leave_all_out(&mut start.problem);
-    let components =
-        ComponentOptions { joint: options.joint_noise == JointNoise::Estimated, ..ComponentOptions::default() };
-    let mut outcome = match near {
-        Some(_) if has_same_lenses => estimate_components_near(start, &components),
-        Some(_) => estimate_components(start, &components),
-        None => estimate_components_from_above(start, &components),
-    };
+}
+
+/// Takes back what was left out before and fits.
+fn with_taken_back(
+    mut outcome: Outcome,
+    free: &FreePoses,
+    aside: &[usize],
+    (components, limits): (&ComponentOptions, &Limits),
+) -> Outcome {
     for _ in 0..ROUNDS {
-        let images = take_back(&mut outcome, free, aside, &options.limits);
-        if !take_bodies_back(&mut outcome.adjustment, &options.limits) && !images {
+        let images = take_back(&mut outcome, free, aside, limits);
+        if !take_bodies_back(&mut outcome.adjustment, limits) && !images {
             break;
         }
-        outcome = estimate_components(outcome.adjustment, &components);
+        outcome = estimate_components(outcome.adjustment, components);
     }
-    outcome = without_contradicting(outcome, &components, &options.limits);
+    outcome
+}
+
+/// Lets go what the fit does not need to hold.
+fn with_let_go(mut outcome: Outcome, components: &ComponentOptions, limits: &Limits) -> Outcome {
     for _ in 0..ROUNDS {
-        if !let_go(&mut outcome.adjustment, &options.limits) {
+        if !let_go(&mut outcome.adjustment, limits) {
             break;
         }
-        outcome =
-            without_contradicting(estimate_components(outcome.adjustment, &components), &components, &options.limits);
+        outcome = without_contradicting(estimate_components(outcome.adjustment, components), components, limits);
     }
-    if take_agreeing(&mut outcome, &options.limits) {
-        outcome = estimate_components(outcome.adjustment, &components);
-        outcome = without_contradicting(outcome, &components, &options.limits);
+    outcome
+}
+
+/// Takes in what was left out and agrees.
+fn with_agreeing(mut outcome: Outcome, components: &ComponentOptions, limits: &Limits) -> Outcome {
+    if !take_agreeing(&mut outcome, limits) {
+        return outcome;
     }
-    if components.joint { without_unidentified_noise(outcome, &components.settings) } else { (outcome.ended(), None) }
+    outcome = estimate_components(outcome.adjustment, components);
+    without_contradicting(outcome, components, limits)
 }
 
 /// Leaves out what disagrees with all else, as long as something does.

@@ -4,7 +4,7 @@ use crate::diagnose::{HALF_TURN_DEG, MistakeKind};
 use crate::model::mirror::mirror_images;
 use crate::model::robot::Robot;
 use crate::series::{LENGTH_UNITS, LengthUnit};
-use crate::urdf::{JointKind, SEARCHED_M};
+use crate::urdf::{Chain, JointKind, SEARCHED_M};
 
 /// The readings of all stops with one mistake undone, and its name.
 pub(in crate::identify) type Undone = (Vec<Vec<f64>>, MistakeKind);
@@ -17,56 +17,99 @@ pub(in crate::identify) fn mistakes_undone(robot: &Robot, given: &[Vec<f64>]) ->
 
 /// Those of columns.
 pub(in crate::identify) fn columns_undone(robot: &Robot, given: &[Vec<f64>]) -> Vec<Undone> {
-    let (names, kinds) = (&robot.chain.readings, &robot.chain.reading_kinds);
-    let (n, limits) = (names.len(), robot.chain.limits_or(SEARCHED_M));
-    let named = |joints: &[usize]| joints.iter().map(|&k| names[k].clone()).collect();
-    let mut all = Vec::new();
-    let mut add = |mistake, change: &dyn Fn(&mut Vec<f64>)| {
-        let mut changed = given.to_vec();
+    let chain = &robot.chain;
+    let limits = chain.limits_or(SEARCHED_M);
+    let mut columns = Columns { chain, given, undone: Vec::new() };
+    for (k, kind) in chain.reading_kinds.iter().enumerate() {
+        columns.add_signs_and_order(k);
+        columns.add_coupled(k);
+        match kind {
+            JointKind::Prismatic => columns.add_slide_units(k),
+            JointKind::Revolute => columns.add_zeros_and_units(k, limits[k]),
+            _ => {}
+        }
+    }
+    columns.add_units_of_all();
+    columns.add(MistakeKind::Reversed(chain.readings.clone()), |q| q.reverse());
+    columns.undone
+}
+
+/// Factors from what was read to what it is, by whether it is degrees.
+const ANGLE_UNITS: [(bool, f64); 2] = [(true, 1f64.to_radians()), (false, 1f64.to_degrees())];
+
+/// The columns of readings, and what was undone in them.
+struct Columns<'a> {
+    chain: &'a Chain,
+    given: &'a [Vec<f64>],
+    undone: Vec<Undone>,
+}
+
+impl Columns<'_> {
+    fn add(&mut self, mistake: MistakeKind, change: impl Fn(&mut Vec<f64>)) {
+        let mut changed = self.given.to_vec();
         changed.iter_mut().for_each(change);
-        all.push((changed, mistake));
-    };
-    let units = [(true, 1f64.to_radians()), (false, 1f64.to_degrees())];
-    for k in 0..n {
-        add(MistakeKind::Signs(named(&[k])), &|q| q[k] = -q[k]);
+        self.undone.push((changed, mistake));
+    }
+
+    fn name(&self, joint: usize) -> String {
+        self.chain.readings[joint].clone()
+    }
+
+    /// Of a joint alone, and with one or two behind it.
+    fn add_signs_and_order(&mut self, k: usize) {
+        let n = self.chain.readings.len();
+        self.add(MistakeKind::Signs(vec![self.name(k)]), |q| q[k] = -q[k]);
         for other in k + 1..n {
-            add(MistakeKind::Columns(named(&[k, other])), &|q| q.swap(k, other));
-            add(MistakeKind::Signs(named(&[k, other])), &|q| (q[k], q[other]) = (-q[k], -q[other]));
+            let names = vec![self.name(k), self.name(other)];
+            self.add(MistakeKind::Columns(names.clone()), |q| q.swap(k, other));
+            self.add(MistakeKind::Signs(names), |q| (q[k], q[other]) = (-q[k], -q[other]));
             for third in other + 1..n {
                 for (a, b) in [(other, third), (third, other)] {
-                    add(MistakeKind::Columns(named(&[k, a, b])), &|q| (q[k], q[a], q[b]) = (q[a], q[b], q[k]));
+                    let names = [k, a, b].map(|joint| self.name(joint)).to_vec();
+                    self.add(MistakeKind::Columns(names), |q| (q[k], q[a], q[b]) = (q[a], q[b], q[k]));
                 }
             }
         }
-        if k > 0 && [kinds[k - 1], kinds[k]] == [JointKind::Revolute; 2] {
-            for (is_sum, sign) in [(true, 1.0), (false, -1.0)] {
-                let joints = [k, k - 1].map(|joint| names[joint].clone());
-                add(MistakeKind::Coupled { joints, is_sum }, &|q| q[k] += sign * q[k - 1]);
-            }
+    }
+
+    /// Counted together with the joint before.
+    fn add_coupled(&mut self, k: usize) {
+        let kinds = &self.chain.reading_kinds;
+        if k == 0 || [kinds[k - 1], kinds[k]] != [JointKind::Revolute; 2] {
+            return;
         }
-        if kinds[k] == JointKind::Prismatic {
-            for LengthUnit { name, metres, .. } in LENGTH_UNITS {
-                add(MistakeKind::SlideUnit { joint: names[k].clone(), unit: name, metres }, &|q| q[k] *= metres);
-            }
-        }
-        if kinds[k] == JointKind::Revolute {
-            for lacking_deg in [90.0, -90.0, half_turn_deg(limits[k], given.iter().map(|q| q[k]))] {
-                add(MistakeKind::Zero { joint: names[k].clone(), lacking_deg }, &|q| q[k] += lacking_deg.to_radians());
-            }
-            for (are_degrees, factor) in units {
-                let joint = Some(names[k].clone());
-                add(MistakeKind::Unit { joint, are_degrees }, &|q| q[k] *= factor);
-            }
+        for (is_sum, sign) in [(true, 1.0), (false, -1.0)] {
+            let joints = [k, k - 1].map(|joint| self.name(joint));
+            self.add(MistakeKind::Coupled { joints, is_sum }, |q| q[k] += sign * q[k - 1]);
         }
     }
-    for (are_degrees, factor) in units {
-        add(MistakeKind::Unit { joint: None, are_degrees }, &|q| {
-            let revolute = q.iter_mut().zip(kinds).filter(|(_, kind)| **kind == JointKind::Revolute);
-            revolute.for_each(|(v, _)| *v *= factor);
-        });
+
+    fn add_slide_units(&mut self, k: usize) {
+        for LengthUnit { name, metres, .. } in LENGTH_UNITS {
+            let joint = self.name(k);
+            self.add(MistakeKind::SlideUnit { joint, unit: name, metres }, |q| q[k] *= metres);
+        }
     }
-    add(MistakeKind::Reversed(names.clone()), &|q| q.reverse());
-    all
+
+    fn add_zeros_and_units(&mut self, k: usize, limits: (f64, f64)) {
+        for lacking_deg in [90.0, -90.0, half_turn_deg(limits, self.given.iter().map(|q| q[k]))] {
+            let joint = self.name(k);
+            self.add(MistakeKind::Zero { joint, lacking_deg }, |q| q[k] += lacking_deg.to_radians());
+        }
+        for (are_degrees, factor) in ANGLE_UNITS {
+            let joint = Some(self.name(k));
+            self.add(MistakeKind::Unit { joint, are_degrees }, |q| q[k] *= factor);
+        }
+    }
+
+    fn add_units_of_all(&mut self) {
+        for (are_degrees, factor) in ANGLE_UNITS {
+            self.add(MistakeKind::Unit { joint: None, are_degrees }, |q| {
+                let revolute = q.iter_mut().zip(&self.chain.reading_kinds).filter(|(_, k)| **k == JointKind::Revolute);
+                revolute.for_each(|(v, _)| *v *= factor);
+            });
+        }
+    }
 }
 
 /// Half a turn to the side that leads readings towards the middle of their limits.
