@@ -116,10 +116,24 @@ pub fn compare_poses(
             "name its rows as the images, in the column image or stop",
         ));
     }
-    let (mut x, mut y) = start(&pairs, body).ok_or_else(|| {
+    let start = start(&pairs, body).ok_or_else(|| {
         let what = "its poses do not tell where the body is on the camera";
         Error::new(Code::FitUndetermined, place, what, "give poses that are turned about two axes at least")
     })?;
+    let (equations, scale, sigmas) = fitted(&pairs, start, body);
+    let together = found.covariance_together()?;
+    let expected =
+        gain(&equations, sigmas).and_then(|gain| expected_squares(&pairs, &equations, &gain, together.as_ref()));
+    let square = |(pair, (r, _)): (&Pair, &Equation)| Some(r.dot(&(pair.information? * r)));
+    let squares = pairs.iter().zip(&equations).filter_map(square).sum::<f64>();
+    let normalised = expected.map_or(f64::NAN, |expected| squares / expected);
+    let rms = rms(&equations);
+    let differences = pairs.into_iter().zip(equations).map(|(p, (twist, _))| PoseDifference { image: p.image, twist });
+    Ok(PoseComparison { differences: differences.collect(), rms, relative_scale: scale, normalised })
+}
+
+/// The equations at the best poses of frame and body and the best scale, from a start; the scale, and the sigmas by which they are weighed.
+fn fitted(pairs: &[Pair], (mut x, mut y): (Pose, Pose), body: OtherBody) -> (Vec<Equation>, f64, [f64; 2]) {
     let (mut scale, mut sigmas) = (0.0, [FIRST_M_PER_RAD, 1.0]);
     let unknowns = if body == OtherBody::Camera { 7 } else { 13 };
     let equations_at = |x: &Pose, y: &Pose, scale: f64| -> Vec<Equation> {
@@ -138,15 +152,7 @@ pub fn compare_poses(
         equations = equations_at(&x, &y, scale);
         sigmas = rms(&equations).map(|s| s.max(f64::MIN_POSITIVE.sqrt()));
     }
-    let together = found.covariance_together()?;
-    let expected =
-        gain(&equations, sigmas).and_then(|gain| expected_squares(&pairs, &equations, &gain, together.as_ref()));
-    let square = |(pair, (r, _)): (&Pair, &Equation)| Some(r.dot(&(pair.information? * r)));
-    let squares = pairs.iter().zip(&equations).filter_map(square).sum::<f64>();
-    let normalised = expected.map_or(f64::NAN, |expected| squares / expected);
-    let rms = rms(&equations);
-    let differences = pairs.into_iter().zip(equations).map(|(p, (twist, _))| PoseDifference { image: p.image, twist });
-    Ok(PoseComparison { differences: differences.collect(), rms, relative_scale: scale, normalised })
+    (equations, scale, sigmas)
 }
 
 /// Residual of a pose, and its derivative by the unknowns.

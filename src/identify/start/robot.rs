@@ -158,6 +158,18 @@ fn closest(poses: &[PosePair], solution: impl Fn(&PosePair) -> HandEye) -> HandE
     best
 }
 
+fn require_enough(images: usize, of: &str, limits: &Limits) -> Result<()> {
+    let fewest = limits.hand_eye_images;
+    if images >= fewest {
+        return Ok(());
+    }
+    let what = format!(
+        "only {images} images of the robot show the plate, at least {fewest} are needed and some 30 to 50 wanted"
+    );
+    let remedy = "take more images, or give series that share camera mounting and plate placement the same names";
+    Err(Error::new(Code::ImagesTooFew, of, what, remedy))
+}
+
 fn closed_form(
     Adjustment { problem, state }: &Adjustment,
     pairs: &[(usize, PosePair)],
@@ -167,18 +179,7 @@ fn closed_form(
     StartGiven { series, groups, limits, .. }: StartGiven<'_>,
     verdicts: &mut Vec<StartVerdict>,
 ) -> Result<HandEye> {
-    let fewest = limits.hand_eye_images;
-    if pairs.len() < fewest {
-        return Err(Error::new(
-            Code::ImagesTooFew,
-            of,
-            format!(
-                "only {} images of the robot show the plate, at least {fewest} are needed and some 30 to 50 wanted",
-                pairs.len()
-            ),
-            "take more images, or give series that share camera mounting and plate placement the same names",
-        ));
-    }
+    require_enough(pairs.len(), of, limits)?;
     check_rotations(of, poses, &state.robot, limits)?;
     let starts = solve_hand_eye(poses);
     let cost = |s: &HandEyeStart| {

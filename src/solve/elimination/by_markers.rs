@@ -45,14 +45,7 @@ impl MarkersEliminated {
     /// Information with the priors of latents and markers, without those of the dense columns.
     pub fn build(linear: LinearProblem, lambda: f64) -> (DMatrix<f64>, Self) {
         let (layout, seen) = (&linear.adjustment.problem.layout, SeenMarkers::of(linear));
-        let mut n = layout.len();
-        let latent_start: Vec<usize> = (linear.stops())
-            .map(|stop| {
-                let own = stop.unknowns();
-                n += own;
-                n - own
-            })
-            .collect();
+        let (latent_start, n) = latent_starts(linear);
         let mut a = DMatrix::zeros(n, n);
         let mut of_unknowns = (n == layout.len()).then(|| DenseCoupling::new(layout, &seen));
         let mut starts = latent_start.iter();
@@ -62,30 +55,13 @@ impl MarkersEliminated {
             if let Some(coupling) = &mut of_unknowns {
                 let images: Vec<_> = linear.stops_of(stops).flat_map(|stop| stop.images()).collect();
                 let equations: Vec<_> = images.iter().filter_map(LinearImage::equations).collect();
-                coupling.add(
-                    &rows,
-                    &images.into_iter().zip(equations.iter().map(Cow::as_ref)).collect::<Vec<_>>(),
-                    &seen,
-                );
+                let of_images: Vec<_> = images.into_iter().zip(equations.iter().map(Cow::as_ref)).collect();
+                coupling.add(&rows, &of_images, &seen);
             }
-            for (stop, &start) in linear.stops_of(stops).zip(&mut starts) {
-                for pose in stop.poses() {
-                    let with_dense = rows.of(pose.place).tr_mul(&pose.chain.d_latent);
-                    for (row, own) in pose.latents.into_iter().zip(with_dense.column_iter()) {
-                        let mut column = a.view_mut((0, start + row), (with_dense.nrows(), 1));
-                        column += own;
-                    }
-                }
-                let mut own = stop.information();
-                own.fill_lower_triangle_with_upper_triangle();
-                a.view_mut((start, start), own.shape()).copy_from(&own);
-            }
+            linear.stops_of(stops).zip(&mut starts).for_each(|(stop, &start)| add_latents(&mut a, &rows, &stop, start));
         }
-        let damped = |mut v: Matrix3<f64>| {
-            (0..3).for_each(|d| v[(d, d)] *= 1.0 + lambda);
-            v.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or_else(Matrix3::zeros)
-        };
-        let inverse_factors: Vec<Matrix3<f64>> = seen.information(linear).into_iter().map(damped).collect();
+        let of_markers = seen.information(linear).into_iter();
+        let inverse_factors: Vec<Matrix3<f64>> = of_markers.map(|v| damped_inverse_factor(v, lambda)).collect();
         let (space, mut y) = match of_unknowns {
             Some(coupling) => (PoseSpace::of_unknowns(layout), coupling.of_all(layout)),
             None => {
@@ -265,6 +241,37 @@ impl MarkersEliminated {
         let held = self.held.rows(3 * block.markers.start, 3 * block.markers.len());
         block.whole(self.space.rows()) - &self.taken * held.transpose()
     }
+}
+
+/// Where the latents of every stop start behind the dense columns, and where they end.
+fn latent_starts(linear: LinearProblem) -> (Vec<usize>, usize) {
+    let mut n = linear.adjustment.problem.layout.len();
+    let start = |own: usize| {
+        n += own;
+        n - own
+    };
+    let starts = linear.stops().map(|stop| stop.unknowns()).map(start).collect();
+    (starts, n)
+}
+
+/// Information of the latents of a stop, and of them with the dense columns.
+fn add_latents(a: &mut DMatrix<f64>, rows: &PoseRows, stop: &LinearStop, start: usize) {
+    for pose in stop.poses() {
+        let with_dense = rows.of(pose.place).tr_mul(&pose.chain.d_latent);
+        for (row, own) in pose.latents.into_iter().zip(with_dense.column_iter()) {
+            let mut column = a.view_mut((0, start + row), (with_dense.nrows(), 1));
+            column += own;
+        }
+    }
+    let mut own = stop.information();
+    own.fill_lower_triangle_with_upper_triangle();
+    a.view_mut((start, start), own.shape()).copy_from(&own);
+}
+
+/// `F^-1` of the damped information of a marker; zero where it has none.
+fn damped_inverse_factor(mut v: Matrix3<f64>, lambda: f64) -> Matrix3<f64> {
+    (0..3).for_each(|d| v[(d, d)] *= 1.0 + lambda);
+    v.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or_else(Matrix3::zeros)
 }
 
 /// As a matrix.

@@ -176,34 +176,44 @@ fn draw_together(
         of.iter().for_each(|(c, w)| mean[*c] += w / whole);
         (whole > 0.0).then_some(mean)
     };
-    let mut drawn = Vec::new();
-    let mut draw = |from: &[(usize, f64)], to: &[(usize, f64)]| drawn.extend(mean(from).zip(mean(to)));
-    let alone = |c: &usize| [(*c, 1.0)];
+    let mut drawn = Draws::new();
     for group in noise.groups(kinds) {
-        let own_of = |s: usize| group.iter().map(|r| s * n + r).collect::<Vec<_>>();
-        let level_of = |s: usize| own_of(s).into_iter().map(|c| (c, 1.0)).collect::<Vec<_>>();
-        let overall: Vec<_> = (0..series).flat_map(level_of).collect();
-        for s in 0..series {
-            own_of(s).iter().for_each(|c| draw(&alone(c), &level_of(s)));
-            draw(&level_of(s), &overall);
-        }
+        draw_readings(&mut drawn, &group, n, series);
         if is_local(group[0]) {
             let alike = (0..n).filter(|&r| kinds[r] == kinds[group[0]]);
             let (local, others): (Vec<usize>, Vec<usize>) = alike.partition(|&r| is_local(r));
             let local: Vec<usize> = local.iter().map(|r| series * n + r).collect();
             let own = (0..series).flat_map(|s| others.iter().map(move |r| s * n + r));
             let common: Vec<_> = local.iter().copied().chain(own).map(|c| (c, weight[c])).collect();
-            local.iter().for_each(|c| draw(&alone(c), &common));
+            drawn.extend(local.iter().map(|c| (alone(*c), common.clone())));
         }
     }
     for group in noise.displacement_groups() {
         let group: Vec<usize> = group.iter().map(|k| series * n + noise.local.len() + k).collect();
-        let all: Vec<_> = group.iter().flat_map(alone).collect();
-        group.iter().for_each(|c| draw(&alone(c), &all));
+        let all: Vec<_> = group.iter().flat_map(|c| alone(*c)).collect();
+        drawn.extend(group.iter().map(|c| (alone(*c), all.clone())));
     }
-    for (from, to) in drawn {
-        let contrast = from - to;
-        information.ger(0.5 * SHRINKAGE, &contrast, &contrast, 1.0);
+    let contrast = |(from, to): &(Weighted, Weighted)| Some(mean(from)? - mean(to)?);
+    let contrasts: Vec<DVector<f64>> = drawn.iter().filter_map(contrast).collect();
+    contrasts.iter().for_each(|contrast| information.ger(0.5 * SHRINKAGE, contrast, contrast, 1.0));
+}
+
+/// Variances with their weights in a mean.
+type Weighted = Vec<(usize, f64)>;
+/// Means, and those that they are drawn to.
+type Draws = Vec<(Weighted, Weighted)>;
+
+fn alone(variance: usize) -> Weighted {
+    vec![(variance, 1.0)]
+}
+
+/// The joint noise of a group of `n` readings in every series to that of the group there, and this to that of all series.
+fn draw_readings(drawn: &mut Draws, group: &[usize], n: usize, series: usize) {
+    let of = |s: usize| group.iter().map(move |r| (s * n + r, 1.0)).collect::<Weighted>();
+    let overall: Weighted = (0..series).flat_map(of).collect();
+    for s in 0..series {
+        drawn.extend(of(s).iter().map(|(c, _)| (alone(*c), of(s))));
+        drawn.push((of(s), overall.clone()));
     }
 }
 
