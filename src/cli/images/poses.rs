@@ -1,5 +1,6 @@
 //! `robotcal poses`: camera, plate and stand-alone camera poses from images alone.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -14,7 +15,9 @@ use crate::cli::terminal::progress;
 use crate::cli::terminal::say::{say, say_line};
 use crate::diagnose::Finding;
 use crate::error::{Code, Error, Notice, Result};
+use crate::fit::Fit;
 use crate::identify::{NamedSeries, PoseSigma, StandAlone, bring_together, measure, stand_alone};
+use crate::model::camera::Camera;
 use crate::output::poses_record::{usual, worst};
 use crate::output::stand_alone_files::{self, StandAloneContext, stand_alone_files};
 use crate::output::{REPORT, ResultFolder, folder_name};
@@ -130,7 +133,7 @@ fn in_words([position_m, rotation_rad]: [f64; 2]) -> String {
 
 /// What is printed: the poses as a whole, cameras, scale, and the images.
 fn text(found: &StandAlone) -> Result<String> {
-    let Adjustment { problem, state } = &found.fit.adjustment;
+    let problem = &found.fit.problem;
     let sigmas = found.sigmas();
     let (usual, worst) = usual(&sigmas).zip(worst(&sigmas)).ok_or_else(|| {
         Error::new(Code::PlateNowhere, "poses", "no image has a pose", "look at one of the images: is the plate in it?")
@@ -144,24 +147,7 @@ fn text(found: &StandAlone) -> Result<String> {
         in_words([worst.position_m, worst.rotation_rad]),
         name(worst.image)
     );
-    let cameras = problem.cameras.iter().zip(&state.cameras).zip(&problem.layout.cameras);
-    for ((name, camera), columns) in cameras {
-        let parameters = &camera.parameters;
-        let sigma = |c: usize| found.fit.covariance.sigma(columns.start + c);
-        text += &format!(
-            "camera    {}: {}, fx {:.3} +- {:.3}, fy {:.3} +- {:.3}, centre ({:.3} +- {:.3}, {:.3} +- {:.3}) px\n",
-            name,
-            camera.lens.name(),
-            parameters[0],
-            sigma(0),
-            parameters[1],
-            sigma(1),
-            parameters[2],
-            sigma(2),
-            parameters[3],
-            sigma(3),
-        );
-    }
+    text += &cameras_text(&found.fit);
     text += &format!(
         "residuals {:.4} px RMS per point over {} observations\n",
         found.free_poses.rms_px, found.free_poses.observations
@@ -178,6 +164,19 @@ fn text(found: &StandAlone) -> Result<String> {
         }
     }
     Ok(text + &table(&sigmas, name))
+}
+
+fn cameras_text(fit: &Fit) -> String {
+    let Adjustment { problem, state } = &fit.adjustment;
+    let cameras = problem.cameras.iter().zip(&state.cameras).zip(&problem.layout.cameras);
+    let line = |((name, camera), columns): ((&String, &Camera), &Range<usize>)| {
+        let lens = camera.lens.name();
+        let [fx, fy, x, y] = std::array::from_fn(|c| {
+            format!("{:.3} +- {:.3}", camera.parameters[c], fit.covariance.sigma(columns.start + c))
+        });
+        format!("camera    {name}: {lens}, fx {fx}, fy {fy}, centre ({x}, {y}) px\n")
+    };
+    cameras.map(line).collect()
 }
 
 /// A row for every image; of many images the worst.

@@ -1,7 +1,7 @@
 //! `robotcal convert`: a recording becomes a series folder, a series folder becomes a recording, a camera goes to another program.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -95,15 +95,7 @@ fn to_recording(args: &ConvertArgs) -> Result<Verdict> {
     series::require_new(&args.to)?;
     let folder = folder_of(&args.to);
     let _tried = ResultFolder::among(folder)?;
-    let Some(urdf) = &args.urdf else {
-        let what = "the joints of a series mean nothing without their robot";
-        return Err(Error::new(
-            Code::OptionMissing,
-            args.from.display(),
-            what,
-            "add --urdf robot.urdf (and --base, --tip if needed)",
-        ));
-    };
+    let urdf = args.urdf.as_ref().ok_or_else(|| without_urdf(&args.from))?;
     let series = series::read_images(&args.from)?;
     refuse_more_than_one(&series)?;
     let ends = Ends { base: args.base.as_deref(), tip: args.tip.as_deref() };
@@ -130,13 +122,16 @@ fn to_recording(args: &ConvertArgs) -> Result<Verdict> {
     }
     let of_robot: Vec<Notice> = tip_notice.into_iter().chain(Notice::said_once(&description.notices)).collect();
     let of_readings = series.reading_notices(&chain);
-    for notice in of_robot.iter().chain(&series.notices).chain(&of_readings).chain(&written.notices) {
-        say_line!("note      {}", notice.coded());
-    }
-    for image in &written.unreadable {
-        say_line!("left out  {}", image.coded());
-    }
+    let notices = of_robot.iter().chain(&series.notices).chain(&of_readings).chain(&written.notices);
+    notices.for_each(|notice| say_line!("note      {}", notice.coded()));
+    written.unreadable.iter().for_each(|image| say_line!("left out  {}", image.coded()));
     Ok(if written.unreadable.is_empty() { Verdict::Good } else { Verdict::GateFailed })
+}
+
+fn without_urdf(series: &Path) -> Error {
+    let what = "the joints of a series mean nothing without their robot";
+    let remedy = "add --urdf robot.urdf (and --base, --tip if needed)";
+    Error::new(Code::OptionMissing, series.display(), what, remedy)
 }
 
 /// A recording has one camera, and says nothing of where the plate stood.

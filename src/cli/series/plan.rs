@@ -484,44 +484,46 @@ fn setting_of_flags(args: &PlanArgs, robot: Robot) -> Result<Setting> {
         .ok_or_else(|| Error::new(Code::OptionMissing, "--plate", "is missing", "give plate.toml"))?;
     let plate = read_plate(plate, &mut Vec::new())?;
     let mount: CameraMount = args.mount.into();
-    let mounting = match (&args.hand_camera, mount) {
-        (Some(text), _) => pose_or_file("--hand-camera", text)?,
-        (None, CameraMount::Hand) => Pose::from_xyz_rpy([0.0, 0.0, 0.08], [0.0; 3]),
-        (None, CameraMount::Fixed) => {
-            return Err(Error::new(
-                Code::OptionMissing,
-                "--hand-camera",
-                "is missing",
-                "say where the fixed camera stands in the base frame",
-            ));
-        }
-    };
-    let mut placements = Vec::new();
-    for (k, text) in args.plate_pose.iter().enumerate() {
-        placements.push((format!("placement_{k}"), pose_or_file("--plate-pose", text)?));
-    }
-    if placements.is_empty() {
-        let place = match mount {
-            CameraMount::Hand => before_robot(&robot.chain, 0.5, 0.0, 0.0),
-            CameraMount::Fixed => Pose::from_xyz_rpy([0.0, 0.0, 0.05], [0.0; 3]),
-        };
-        placements.push(("placement_0".to_owned(), place));
-    }
     let joint_sigma = robot.chain.reading_kinds.iter().map(|kind| {
         let rad = args.joint_noise_mrad / 1e3;
         if *kind == JointKind::Prismatic { 0.1 * rad } else { rad }
     });
     Ok(Setting {
         joint_sigma: joint_sigma.collect(),
+        mounting: mounting(args, mount)?,
+        placements: placements(args, mount, &robot)?,
         camera: camera(args)?,
         mount,
-        mounting,
-        placements,
         plate,
         pixel_sigma_px: args.pixel_noise_px,
         robot,
         beside: Beside::default(),
     })
+}
+
+/// Where the camera is on the tip, or stands in the base.
+fn mounting(args: &PlanArgs, mount: CameraMount) -> Result<Pose> {
+    match (&args.hand_camera, mount) {
+        (Some(text), _) => pose_or_file("--hand-camera", text),
+        (None, CameraMount::Hand) => Ok(Pose::from_xyz_rpy([0.0, 0.0, 0.08], [0.0; 3])),
+        (None, CameraMount::Fixed) => {
+            let remedy = "say where the fixed camera stands in the base frame";
+            Err(Error::new(Code::OptionMissing, "--hand-camera", "is missing", remedy))
+        }
+    }
+}
+
+/// Where the plate stands in the base, or is on the tip; by default in the reach of the camera.
+fn placements(args: &PlanArgs, mount: CameraMount, robot: &Robot) -> Result<Vec<(String, Pose)>> {
+    if args.plate_pose.is_empty() {
+        let place = match mount {
+            CameraMount::Hand => before_robot(&robot.chain, 0.5, 0.0, 0.0),
+            CameraMount::Fixed => Pose::from_xyz_rpy([0.0, 0.0, 0.05], [0.0; 3]),
+        };
+        return Ok(vec![("placement_0".to_owned(), place)]);
+    }
+    let given = args.plate_pose.iter().enumerate();
+    given.map(|(k, text)| Ok((format!("placement_{k}"), pose_or_file("--plate-pose", text)?))).collect()
 }
 
 fn camera(args: &PlanArgs) -> Result<Camera> {

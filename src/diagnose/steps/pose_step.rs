@@ -58,31 +58,17 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
     let all = Squares::of(&linear, problem);
     let (mut left, mut found, mut good) = (all.clone(), Vec::<Step>::new(), Vec::new());
     while found.len() < limits.displacements {
-        let tried = linear.candidates(problem, limits.displaced_images);
-        let Some(mut best) = linear.best(problem, &tried, &left.zeros, chances) else { break };
-        let log_chance = best.log_chance + (tried.len() as f64).ln();
-        if log_chance > limits.displaced_false_alarms.ln() {
-            break;
-        }
-        if best.changed == Changed::Fixture
-            && let Some(single) = linear.one_by_one(problem, &best, &tried, chances)
-        {
-            best = single;
-        }
-        if let Some(otherwise) = linear.seen_otherwise(problem, &best, limits.displaced_images) {
-            best = otherwise;
-        }
+        let Some((mut best, tried)) = most_unlikely(&linear, problem, &left, chances, limits) else { break };
         let Some((next, step)) = linear.with(problem, &best) else { break };
         linear = next;
         let before = std::mem::replace(&mut left, Squares::of(&linear, problem));
         let share = before.explained(&left, &best);
         tracing::debug!(?best.changed, ?best.order, first = ?best.shown.first(), moved = best.shown.len(), fall = best.fall, share,
-            log_chance, change = ?best.change, "step");
-        let explains_most = share > limits.displaced_share && {
-            let stops = linear.stops(best.group) as f64 / chances.stops_for_one;
-            let by_posture = chance_of_share(share, stops, best.told) + (tried.len() as f64).ln();
-            !matches!(best.order, Order::Up(_)) || by_posture < limits.displaced_by_posture.ln()
-        };
+            log_chance = best.log_chance, change = ?best.change, "step");
+        let stops = linear.stops(best.group) as f64 / chances.stops_for_one;
+        let by_posture = chance_of_share(share, stops, best.told) + (tried as f64).ln();
+        let is_beyond_posture = !matches!(best.order, Order::Up(_)) || by_posture < limits.displaced_by_posture.ln();
+        let explains_most = share > limits.displaced_share && is_beyond_posture;
         best.change.fill(0.0);
         found.push(best);
         let mut first = columns;
@@ -103,6 +89,30 @@ fn find_steps(fit: &Fit, limits: &Limits) -> Vec<Step> {
     let first = |step: &Step| step.shown.first().map(|shown| shown.place(problem));
     good.sort_by_key(|s| (matches!(s.order, Order::Up(_)), first(s)));
     good
+}
+
+/// The step that chance explains least, of how many; `None` where chance explains it.
+fn most_unlikely(
+    linear: &Linear,
+    problem: &Problem,
+    left: &Squares,
+    chances: Chances,
+    limits: &Limits,
+) -> Option<(Step, usize)> {
+    let tried = linear.candidates(problem, limits.displaced_images);
+    let mut best = linear.best(problem, &tried, &left.zeros, chances)?;
+    if best.log_chance + (tried.len() as f64).ln() > limits.displaced_false_alarms.ln() {
+        return None;
+    }
+    if best.changed == Changed::Fixture
+        && let Some(single) = linear.one_by_one(problem, &best, &tried, chances)
+    {
+        best = single;
+    }
+    if let Some(otherwise) = linear.seen_otherwise(problem, &best, limits.displaced_images) {
+        best = otherwise;
+    }
+    Some((best, tried.len()))
 }
 
 /// Squares of what was seen against the readings, by the index of the noise.

@@ -283,18 +283,7 @@ pub fn add(readings: &mut [f64], offsets: &[f64]) {
 /// # Errors
 /// A file that does not hang together.
 pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
-    let robot = found_robot(record)?;
-    let state = State {
-        robot: robot.clone(),
-        mountings: record.mountings.iter().map(|m| (&m.pose).into()).collect(),
-        placements: record.placements.iter().map(|p| (&p.pose).into()).collect(),
-        instruments: record.bodies.instruments.iter().map(|i| (&i.pose).into()).collect(),
-        bodies: record.bodies.bodies.iter().map(|b| (&b.pose).into()).collect(),
-        cameras: record.cameras.iter().map(camera).collect(),
-        plates: record.plates.iter().map(|p| plate(p).map(|p| PlateShape::nominal(&p))).collect::<Result<_>>()?,
-        joint_errors: Vec::new(),
-        ties: Vec::new(),
-    };
+    let state = found_state(record)?;
     let names = |all: &[super::solution_json::PlacedRecord]| all.iter().map(|p| p.name.clone()).collect::<Vec<_>>();
     let cameras: Vec<String> = record.cameras.iter().map(|c| c.name.clone()).collect();
     let plates: Vec<String> = record.plates.iter().map(|p| p.name.clone()).collect();
@@ -308,17 +297,8 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
         instruments: &record.bodies.named_instruments(),
         bodies: &bodies,
     };
-    let mut layout = Layout::new(&state, &names);
+    let layout = found_layout(record, &state, &names)?;
     let n = layout.len();
-    if record.estimates.len() != n || record.covariance_lower.len() != n * (n + 1) / 2 {
-        return Err(damaged(format!("there are {} estimates for {n} parameters", record.estimates.len())));
-    }
-    debug_assert_eq!(MODES, layout.shapes.first().map_or(MODES, |r| r.len()));
-    for (column, e) in layout.columns.iter_mut().zip(&record.estimates) {
-        column.free = e.free;
-        column.prior_sigma = e.prior_sigma.unwrap_or(f64::INFINITY);
-        column.prior_mean = e.prior_mean.unwrap_or(0.0);
-    }
     let at = |i: usize, j: usize| record.covariance_lower[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
     let used = || record.images.iter().filter(|i| i.is_used());
     let stop = |i: &ImageRecord| i.readings.clone().map(|readings| Posture { readings, approach: i.approach.clone() });
@@ -332,10 +312,40 @@ pub fn found_model(record: &SolutionRecord) -> Result<FoundModel> {
         joint_most: of_readings(record, |noise| most_noise(noise, &record.limits())),
         covariance: DMatrix::from_fn(n, n, at),
         stops: used().filter_map(stop).chain(record.bodies.postures()).collect(),
-        robot: robot.without_local_errors(),
+        robot: state.robot.without_local_errors(),
         layout,
         still,
     })
+}
+
+fn found_state(record: &SolutionRecord) -> Result<State> {
+    Ok(State {
+        robot: found_robot(record)?,
+        mountings: record.mountings.iter().map(|m| (&m.pose).into()).collect(),
+        placements: record.placements.iter().map(|p| (&p.pose).into()).collect(),
+        instruments: record.bodies.instruments.iter().map(|i| (&i.pose).into()).collect(),
+        bodies: record.bodies.bodies.iter().map(|b| (&b.pose).into()).collect(),
+        cameras: record.cameras.iter().map(camera).collect(),
+        plates: record.plates.iter().map(|p| plate(p).map(|p| PlateShape::nominal(&p))).collect::<Result<_>>()?,
+        joint_errors: Vec::new(),
+        ties: Vec::new(),
+    })
+}
+
+/// The columns, with what was held of them and their priors.
+fn found_layout(record: &SolutionRecord, state: &State, names: &Names) -> Result<Layout> {
+    let mut layout = Layout::new(state, names);
+    let n = layout.len();
+    if record.estimates.len() != n || record.covariance_lower.len() != n * (n + 1) / 2 {
+        return Err(damaged(format!("there are {} estimates for {n} parameters", record.estimates.len())));
+    }
+    debug_assert_eq!(MODES, layout.shapes.first().map_or(MODES, |r| r.len()));
+    for (column, e) in layout.columns.iter_mut().zip(&record.estimates) {
+        column.free = e.free;
+        column.prior_sigma = e.prior_sigma.unwrap_or(f64::INFINITY);
+        column.prior_mean = e.prior_mean.unwrap_or(0.0);
+    }
+    Ok(layout)
 }
 
 /// A number of each reading from every series, root mean square; of the cameras in files that know the noise of them only.
