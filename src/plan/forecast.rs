@@ -160,23 +160,10 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
         exact_covariance(&plan.adjustment, setting, stops)
     };
     let whole = exact(&(0..n).collect::<Vec<_>>())?;
-    let random = |count: usize| -> Option<f64> {
-        let step = plan.drawn as f64 / count as f64;
-        let one = |draw: usize| {
-            let mut stops = request.taken.clone();
-            stops.extend((0..count).filter_map(|k| {
-                let shift = draw as f64 / RANDOM_DRAWS as f64;
-                plan.stop(setting, ((k as f64 + shift) * step) as usize, "")
-            }));
-            let covariance = exact_covariance(&plan.adjustment, setting, stops).ok()?;
-            Some(flange_m(&plan.weight, &covariance).powi(2))
-        };
-        let squares: Vec<f64> = (0..RANDOM_DRAWS).into_par_iter().filter_map(one).collect();
-        (!squares.is_empty()).then(|| root_of_mean(squares))
-    };
     let mut curve = Vec::new();
     for count in counts(n) {
-        let (Ok(planned), Some(random_m)) = (exact(&importance[..count]), random(count)) else { continue };
+        let planned = exact(&importance[..count]);
+        let (Ok(planned), Some(random_m)) = (planned, at_random_m(request, plan, count)) else { continue };
         curve.push(CurvePoint { images: count, planned_m: flange_m(&plan.weight, &planned), random_m });
     }
     let start = match request.taken.is_empty() {
@@ -198,6 +185,22 @@ pub fn forecast(request: &PlanRequest, plan: &Plan) -> Result<Forecast> {
         None => gains(plan, |leg| among_others(plan, leg)),
     };
     Ok(Forecast { before_m: before, flange_m: flange, parameters, curve, importance, gains, ranges, words })
+}
+
+/// Expected error of the flange, m, by so many of the candidates that were drawn at random.
+fn at_random_m(request: &PlanRequest, plan: &Plan, count: usize) -> Option<f64> {
+    let step = plan.drawn as f64 / count as f64;
+    let one = |draw: usize| {
+        let mut stops = request.taken.clone();
+        stops.extend((0..count).filter_map(|k| {
+            let shift = draw as f64 / RANDOM_DRAWS as f64;
+            plan.stop(&request.setting, ((k as f64 + shift) * step) as usize, "")
+        }));
+        let covariance = exact_covariance(&plan.adjustment, &request.setting, stops).ok()?;
+        Some(flange_m(&plan.weight, &covariance).powi(2))
+    };
+    let squares: Vec<f64> = (0..RANDOM_DRAWS).into_par_iter().filter_map(one).collect();
+    (!squares.is_empty()).then(|| root_of_mean(squares))
 }
 
 /// Numbers of images at which the curve is computed.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::assess::PredictedFlange;
 use crate::cli::flags::joint_table::{self, Unit};
 use crate::error::Result;
 use crate::output::flange_table::{at_csv, flange_at, relative_to};
@@ -84,24 +85,9 @@ impl AtTable<'_> {
         let path = folder.join(AT);
         let table = at_csv(&model, (*unit).into(), readings, &found);
         write_beside(folder, &[(AT.to_owned(), table.as_bytes())], &[file.to_path_buf()])?;
-        let mut out = String::new();
-        for (k, f) in found.iter().enumerate().take(MOST_ROWS) {
-            let [position, rotation] = f.sigmas();
-            let [x, y, z] = f.pose.xyz().map(|v| 1e3 * v);
-            let outside = if f.outside.is_empty() {
-                String::new()
-            } else {
-                format!("; extrapolated: {} outside the stops", f.outside.join(", "))
-            };
-            // Writing to a String cannot fail.
-            let _ = writeln!(
-                out,
-                "at        row {}: flange at ({x:.2}, {y:.2}, {z:.2}) mm, sigma {:.3} mm, {:.3} mrad{outside}",
-                k + 1,
-                1e3 * position,
-                1e3 * rotation
-            );
-        }
+        let rows = found.iter().enumerate().take(MOST_ROWS);
+        let mut out: String = rows.map(|(k, found)| row_text(k, found)).collect();
+        // Writing to a String cannot fail.
         if found.len() > MOST_ROWS {
             let _ = writeln!(out, "at        and {} more", found.len() - MOST_ROWS);
         }
@@ -123,4 +109,19 @@ impl AtTable<'_> {
         );
         Ok(out)
     }
+}
+
+fn row_text(row: usize, found: &PredictedFlange) -> String {
+    let [position, rotation] = found.sigmas();
+    let [x, y, z] = found.pose.xyz().map(|v| 1e3 * v);
+    let outside = match found.outside.is_empty() {
+        true => String::new(),
+        false => format!("; extrapolated: {} outside the stops", found.outside.join(", ")),
+    };
+    format!(
+        "at        row {}: flange at ({x:.2}, {y:.2}, {z:.2}) mm, sigma {:.3} mm, {:.3} mrad{outside}\n",
+        row + 1,
+        1e3 * position,
+        1e3 * rotation
+    )
 }

@@ -133,19 +133,15 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
                 Some(urdf) => Inputs::read(urdf, &args.series, ends)?,
                 None => Inputs::without_robot(&args.series)?,
             };
-            if place.is_none() && !args.dry_run {
+            if args.dry_run {
+                return say_dry_run(args, inputs, &options);
+            }
+            if place.is_none() {
                 let names: Vec<String> = inputs.series.iter().map(|s| s.name.clone()).collect();
                 place = Some(claim(&Path::new("reports").join(folder_name(&names)))?);
             }
-            if !args.dry_run {
-                at = args.at.table(&inputs.chain)?;
-            }
+            at = args.at.table(&inputs.chain)?;
             let inputs = inputs.with_recordings(&args.recording.options(&[])?)?;
-            if args.dry_run {
-                inputs.tip_notice.iter().for_each(|notice| say_line!("note      {}", notice.coded()));
-                say!("{}", long_table::of_stops(&dry_run(inputs.chain, &inputs.series, &options)?));
-                return Ok(Verdict::Good);
-            }
             if let (Some(unnamed), None) = (&place, &args.out) {
                 require_same_series(unnamed.path(), &args.series, &inputs)?;
             }
@@ -166,6 +162,14 @@ pub fn run(args: &IdentifyArgs) -> Result<Verdict> {
     let calibration = Calibration::of(observed, &Options { estimator, ..options })
         .inspect_err(|_| Notice::said_once(&noticed).iter().for_each(|n| tracing::warn!("{}", n.coded())))?;
     write(args, calibration, place, at.as_ref())
+}
+
+/// What the stops can tell before any image is looked at.
+fn say_dry_run(args: &IdentifyArgs, inputs: Inputs, options: &Options) -> Result<Verdict> {
+    let inputs = inputs.with_recordings(&args.recording.options(&[])?)?;
+    inputs.tip_notice.iter().for_each(|notice| say_line!("note      {}", notice.coded()));
+    say!("{}", long_table::of_stops(&dry_run(inputs.chain, &inputs.series, options)?));
+    Ok(Verdict::Good)
 }
 
 /// Refuses to replace, in a folder that nobody named, the result of another robot or of other series of the same names. A series is the same where it

@@ -77,14 +77,18 @@ pub(super) fn mistake(
     let explaining: Vec<Explained> = tried.filter(explains).collect();
     let (named, kind) = likeliest(&explaining, robot, limits)?;
     let left = explaining[named].0 * shrinks(&explaining[named].1);
-    let of = match kind {
-        MistakeKind::Poses { .. } | MistakeKind::MeasuredUnit(_) => {
-            format!("{}, {}", table(problem, &problem.body_measurements[measured[0]]), instrument.place())
-        }
-        _ => instrument.place(),
-    };
+    let table = table(problem, &problem.body_measurements[measured[0]]);
+    let of = place_of(&kind, instrument.place(), table);
     let rows_of = rows_of_bodies(adjustment, measured, limits);
     Some(Mistake { kind, of, misfit: as_described, misfit_undone: Some(left), by_images: false, rows_of })
+}
+
+/// The instrument, and the table of what it measured where the mistake stands there.
+fn place_of(kind: &MistakeKind, instrument: String, table: &str) -> String {
+    match kind {
+        MistakeKind::Poses { .. } | MistakeKind::MeasuredUnit(_) => format!("{table}, {instrument}"),
+        _ => instrument,
+    }
 }
 
 /// What was seen with each of the usual mistakes undone: of what the instrument wrote, of columns and signs, and of the rows of stops at which something

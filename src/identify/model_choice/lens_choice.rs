@@ -336,20 +336,7 @@ pub fn choose_lens(
     open: &[String],
     limits: &Limits,
 ) -> Result<Vec<Notice>> {
-    let mut trials: Vec<(Lens, Vec<(String, f64)>)> = Vec::new();
-    let mut last_error = None;
-    let among = |s: &MeasuredSeries, lens: Lens| s.lens_choice == LensChoice::Settled || s.lens_choice.has(lens);
-    let is_open = |lens: &Lens| series.iter().any(|s| open.contains(&s.camera) && among(s, *lens));
-    let lenses: Vec<Lens> = Lens::ALL.into_iter().filter(is_open).collect();
-    for lens in lenses {
-        match held_out_errors(chain, series, lens, limits) {
-            Ok(errors) => trials.push((lens, errors)),
-            Err(error) => last_error = Some(error),
-        }
-    }
-    if let (true, Some(error)) = (trials.is_empty(), last_error) {
-        return Err(error);
-    }
+    let trials = lens_trials(chain, series, open, limits)?;
     let mut notices = Vec::new();
     let names: Vec<String> = trials.first().map_or_else(Vec::new, |t| t.1.iter().map(|e| e.0.clone()).collect());
     for (camera, name) in names.iter().enumerate().filter(|(_, name)| open.contains(name)) {
@@ -371,6 +358,28 @@ pub fn choose_lens(
         notices.push(Notice::new(Code::LensChosen, format!("camera {name}"), what, ""));
     }
     Ok(notices)
+}
+
+/// The error of every camera with each lens that is open to one of the `open` cameras.
+fn lens_trials(
+    chain: &Chain,
+    series: &[MeasuredSeries],
+    open: &[String],
+    limits: &Limits,
+) -> Result<Vec<(Lens, Vec<(String, f64)>)>> {
+    let among = |s: &MeasuredSeries, lens: Lens| s.lens_choice == LensChoice::Settled || s.lens_choice.has(lens);
+    let is_open = |lens: &Lens| series.iter().any(|s| open.contains(&s.camera) && among(s, *lens));
+    let (mut trials, mut last_error) = (Vec::new(), None);
+    for lens in Lens::ALL.into_iter().filter(is_open) {
+        match held_out_errors(chain, series, lens, limits) {
+            Ok(errors) => trials.push((lens, errors)),
+            Err(error) => last_error = Some(error),
+        }
+    }
+    match last_error {
+        Some(error) if trials.is_empty() => Err(error),
+        _ => Ok(trials),
+    }
 }
 
 /// Error of every camera over the observations kept aside, px RMS per point.
