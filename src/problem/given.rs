@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::body::{BodyMeasurement, Instrument};
+use super::body::{BodyMeasurement, Instrument, InstrumentKind};
 use super::bounds::Bounds;
 use super::family::{Family, FamilyKind};
 use super::image::Image;
@@ -212,6 +212,11 @@ impl Problem {
     /// Measurements of bodies that take part, with their indices.
     pub fn used_bodies(&self) -> impl Iterator<Item = (usize, &BodyMeasurement)> {
         self.body_measurements.iter().enumerate().filter(|(_, measured)| measured.rejected.is_none())
+    }
+
+    /// True of what a tracker measured.
+    pub fn is_by_tracker(&self, measured: &BodyMeasurement) -> bool {
+        self.instruments[measured.instrument].kind == InstrumentKind::Tracker
     }
 
     /// True where an image or a measurement of a body takes part at a stop.

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::shifted_measurements::{is_out, misfit, usual_misfit};
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
-use crate::problem::{Adjustment, InstrumentKind, stop_name};
+use crate::problem::{Adjustment, stop_name};
 
 /// Most stops that are named.
 const MOST_STOPS: usize = 6;
@@ -27,8 +27,7 @@ pub struct ExchangedTargets {
 pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ExchangedTargets> {
     let problem = &adjustment.problem;
     let all = &problem.body_measurements;
-    let of_tracker = |k: usize| problem.instruments[all[k].instrument].kind == InstrumentKind::Tracker;
-    let out: Vec<usize> = (0..all.len()).filter(|&k| of_tracker(k) && is_out(&all[k])).collect();
+    let out: Vec<usize> = (0..all.len()).filter(|&k| problem.is_by_tracker(&all[k]) && is_out(&all[k])).collect();
     let usual = usual_misfits(adjustment, out.iter().map(|&k| all[k].instrument).collect());
     let mut found: Vec<ExchangedTargets> = Vec::new();
     for (at, &one) in out.iter().enumerate() {

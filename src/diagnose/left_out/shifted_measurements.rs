@@ -6,7 +6,7 @@ use crate::assess::{Limits, best_run};
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight};
 use crate::error::Code;
 use crate::linalg::median;
-use crate::problem::{Adjustment, BodyMeasurement, BodyRejection, BodySeen, InstrumentKind, TakenFrom, stop_name};
+use crate::problem::{Adjustment, BodyMeasurement, BodyRejection, BodySeen, TakenFrom, stop_name};
 
 /// Rows of a tracker that stand beside the readings of a neighbour, and are left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +30,7 @@ pub fn check(adjustment: &Adjustment, setting: &CheckContext) -> Vec<ShiftedMeas
     let problem = &adjustment.problem;
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (k, measured) in problem.body_measurements.iter().enumerate() {
-        if problem.instruments[measured.instrument].kind == InstrumentKind::Tracker {
+        if problem.is_by_tracker(measured) {
             groups.entry((measured.instrument, measured.body)).or_default().push(k);
         }
     }

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use nalgebra::{DMatrix, Vector3};
 
-use crate::problem::{Adjustment, BodyMeasurement, InstrumentKind, Layout, Problem};
+use crate::problem::{Adjustment, InstrumentKind, Layout, Problem};
 
 /// What may be another from some stop on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,13 +66,9 @@ impl Changed {
     }
 }
 
-fn is_by_tracker(problem: &Problem, measured: &BodyMeasurement) -> bool {
-    problem.instruments[measured.instrument].kind == InstrumentKind::Tracker
-}
-
 /// By how much a twist of all targets together moves the columns of each: about their middle, along the axes of the tip. None of a single one.
 pub(super) fn bracket(Adjustment { problem, state }: &Adjustment) -> DMatrix<f64> {
-    let seen = |b: &usize| problem.used_bodies().any(|(_, m)| m.body == *b && is_by_tracker(problem, m));
+    let seen = |b: &usize| problem.used_bodies().any(|(_, m)| m.body == *b && problem.is_by_tracker(m));
     let targets: Vec<usize> = (0..state.bodies.len()).filter(seen).collect();
     let columns = problem.layout.len();
     if targets.len() < 2 {
@@ -188,7 +184,7 @@ impl Shown {
                 own.instrument == instrument && own.seen.position() == first.seen.position()
             }
             (Self::Measurement(k), Changed::Target(b)) => problem.body_measurements[k].body == b,
-            (Self::Measurement(k), Changed::Bracket) => is_by_tracker(problem, &problem.body_measurements[k]),
+            (Self::Measurement(k), Changed::Bracket) => problem.is_by_tracker(&problem.body_measurements[k]),
             (Self::Measurement(k), Changed::Fixture) => is_socket(problem, problem.body_measurements[k].instrument),
             _ => false,
         }

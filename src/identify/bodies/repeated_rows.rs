@@ -7,14 +7,14 @@ use super::points_start::{DISAGREES, Placed, tip_at};
 use crate::assess::Limits;
 use crate::geom::Pose;
 use crate::linalg::lower_median;
-use crate::problem::{Adjustment, BodyRejection, BodySeen, InstrumentKind, Problem};
+use crate::problem::{Adjustment, BodyRejection, BodySeen, Problem};
 
 /// Leaves out what was written again at successive stops of a series, where the others say that the target was carried further than they miss by, and
 /// is elsewhere.
 pub(super) fn leave_out_stuck(adjustment: &mut Adjustment, limits: &Limits) {
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (k, measured) in adjustment.problem.used_bodies() {
-        if adjustment.problem.instruments[measured.instrument].kind == InstrumentKind::Tracker {
+        if adjustment.problem.is_by_tracker(measured) {
             groups.entry((measured.instrument, measured.body)).or_default().push(k);
         }
     }

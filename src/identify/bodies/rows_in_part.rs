@@ -16,7 +16,7 @@ use crate::diagnose::{Finding, Mistake, MistakeKind, ShiftedPart};
 use crate::error::Result;
 use crate::identify::mistakes::suspects::ENOUGH;
 use crate::linalg::lower_median;
-use crate::problem::{Adjustment, InstrumentKind, MeasuredSeries, Problem, stop_name};
+use crate::problem::{Adjustment, MeasuredSeries, Problem, stop_name};
 use crate::series::spread;
 
 /// Of all divisions, those whose robust start is taken.
@@ -46,8 +46,8 @@ pub(super) fn name_part(
     let misfits: Vec<f64> = own.iter().map(|seen| missed(seen, start)).collect();
     let bound = limits.suspicious_misfit;
     let far = misfits.iter().filter(|misfit| **misfit > bound).count();
-    let is_of_tracker = rows.first().is_some_and(|k| is_of_tracker(problem, *k));
-    if !is_of_tracker || far < limits.moved_images || state.robot.chain.pose_coordinates().is_some() {
+    let is_by_tracker = rows.first().is_some_and(|k| problem.is_by_tracker(&problem.body_measurements[*k]));
+    if !is_by_tracker || far < limits.moved_images || state.robot.chain.pose_coordinates().is_some() {
         return Ok(());
     }
     let read = |(stops, below): (Vec<Option<usize>>, bool)| {
@@ -73,10 +73,6 @@ pub(super) fn name_part(
         rows_of: rows_of_bodies(adjustment, measured, limits),
     };
     Err(Finding::from(mistake).refusal())
-}
-
-fn is_of_tracker(problem: &Problem, row: usize) -> bool {
-    problem.instruments[problem.body_measurements[row].instrument].kind == InstrumentKind::Tracker
 }
 
 /// The part of the rows, by the names of its stops.
