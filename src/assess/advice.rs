@@ -59,6 +59,36 @@ pub(super) struct Adviser<'a> {
     limits: &'a Limits,
 }
 
+/// Some of the stops, with one joint taken to values all over its range.
+fn candidates(robot: &Robot, layout: &Layout, stops: &[Posture], known: &StopsKnowledge) -> Vec<Candidate> {
+    let ranges = robot.chain.ranges();
+    let mut all = Vec::new();
+    for base in stops.iter().step_by((stops.len() / BASES).max(1)).take(BASES) {
+        for (reading, &(low, high)) in ranges.iter().enumerate() {
+            let values = (0..VALUES).map(|k| low + (high - low) * k as f64 / (VALUES - 1) as f64);
+            all.extend(values.filter_map(|value| candidate(robot, layout, base, (reading, value), known)));
+        }
+    }
+    all
+}
+
+/// A stop with a joint taken to a value.
+fn candidate(
+    robot: &Robot,
+    layout: &Layout,
+    base: &Posture,
+    (reading, value): (usize, f64),
+    known: &StopsKnowledge,
+) -> Option<Candidate> {
+    let mut stop = Posture::at(&base.readings);
+    stop.readings[reading] = value;
+    let (j, noise) = known.measurement(robot, layout, &stop);
+    let jc = &j * &known.covariance;
+    let factor = (dense(&noise) + &jc * j.transpose()).cholesky()?;
+    let taken = factor.l().solve_lower_triangular(&jc.columns(0, known.columns.len()).into_owned())?;
+    Some(Candidate { reading, value, taken })
+}
+
 impl<'a> Adviser<'a> {
     pub fn new(
         robot: &'a Robot,
@@ -75,31 +105,12 @@ impl<'a> Adviser<'a> {
             all.sort_by(f64::total_cmp);
             all
         };
-        let ranges = robot.chain.ranges();
-        let mut candidates = Vec::new();
-        for base in stops.iter().step_by((stops.len() / BASES).max(1)).take(BASES) {
-            for (reading, &(low, high)) in ranges.iter().enumerate() {
-                for k in 0..VALUES {
-                    let value = low + (high - low) * k as f64 / (VALUES - 1) as f64;
-                    let mut stop = Posture::at(&base.readings);
-                    stop.readings[reading] = value;
-                    let (j, noise) = known.measurement(robot, layout, &stop);
-                    let jc = &j * &known.covariance;
-                    let total = dense(&noise) + &jc * j.transpose();
-                    let Some(factor) = total.cholesky() else { continue };
-                    let Some(taken) = factor.l().solve_lower_triangular(&jc.columns(0, n).into_owned()) else {
-                        continue;
-                    };
-                    candidates.push(Candidate { reading, value, taken });
-                }
-            }
-        }
         Self {
             robot,
             never,
             covariance: known.covariance.view((0, 0), (n, n)).into_owned(),
             visited: (0..readings).map(visited).collect(),
-            candidates,
+            candidates: candidates(robot, layout, stops, known),
             limits,
         }
     }

@@ -110,16 +110,10 @@ fn files_of(folder: &Path, seen: &mut Examination) {
     if is_recording || has("controller.csv") {
         return;
     }
-    if !has("controller.csv") {
-        need(
-            "joints.csv",
-            "a row each image: its name, then the reading of every joint; the columns are named as in the URDF",
-        );
-    }
-    if !["images", "images.csv", "observations.csv", "points.csv", "poses.csv", "contacts.csv"]
-        .iter()
-        .any(|name| has(name))
-    {
+    let remedy = "a row each image: its name, then the reading of every joint; the columns are named as in the URDF";
+    need("joints.csv", remedy);
+    let measured = ["images", "images.csv", "observations.csv", "points.csv", "poses.csv", "contacts.csv"];
+    if !measured.iter().any(|name| has(name)) {
         need("images", "put the images of the series there, named as in joints.csv");
     }
 }
@@ -134,27 +128,7 @@ fn examine(series: Series, args: &DoctorArgs, options: &RecordingOptions, seen: 
         Ok(series) => series,
         Err(error) => return seen.missing(error),
     };
-    match &series.source {
-        Source::Recording(_) => {}
-        Source::Observations(all) => seen.good("observations.csv", &format!("{} images", all.len())),
-        Source::Cameras(views) => {
-            let cameras = views.iter().filter(|view| view.source != Source::NoImages).count();
-            seen.good("images.csv", &format!("{cameras} cameras at the same stops"));
-            views
-                .iter()
-                .filter(|view| matches!(view.source, Source::Images { .. }))
-                .for_each(|view| images(view, seen));
-        }
-        Source::NoImages => seen.good("measurements", "of the tip in space, without images"),
-        Source::Images { dark, white, .. } => {
-            images(&series, seen);
-            for (name, files) in [("dark/", dark), ("white/", white)] {
-                if !files.is_empty() {
-                    seen.good(name, &format!("{} images for the flat field", files.len()));
-                }
-            }
-        }
-    }
+    sources(&series, seen);
     for view in series.views().iter().filter(|view| matches!(view.source, Source::Observations(_))) {
         image_size(view, None).err().into_iter().for_each(|error| seen.missing(error));
     }
@@ -164,6 +138,29 @@ fn examine(series: Series, args: &DoctorArgs, options: &RecordingOptions, seen: 
         && let Err(error) = robot(&series, urdf, seen)
     {
         seen.missing(error);
+    }
+}
+
+/// What was measured, and the light of its images.
+fn sources(series: &Series, seen: &mut Examination) {
+    match &series.source {
+        Source::Recording(_) => {}
+        Source::Observations(all) => seen.good("observations.csv", &format!("{} images", all.len())),
+        Source::Cameras(views) => {
+            let cameras = views.iter().filter(|view| view.source != Source::NoImages).count();
+            seen.good("images.csv", &format!("{cameras} cameras at the same stops"));
+            let of_images = views.iter().filter(|view| matches!(view.source, Source::Images { .. }));
+            of_images.for_each(|view| images(view, seen));
+        }
+        Source::NoImages => seen.good("measurements", "of the tip in space, without images"),
+        Source::Images { dark, white, .. } => {
+            images(series, seen);
+            for (name, files) in [("dark/", dark), ("white/", white)] {
+                if !files.is_empty() {
+                    seen.good(name, &format!("{} images for the flat field", files.len()));
+                }
+            }
+        }
     }
 }
 

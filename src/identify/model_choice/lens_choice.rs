@@ -360,13 +360,11 @@ pub fn choose_lens(
     Ok(notices)
 }
 
+/// A lens, and the error of every camera with it, by its name.
+type LensTrial = (Lens, Vec<(String, f64)>);
+
 /// The error of every camera with each lens that is open to one of the `open` cameras.
-fn lens_trials(
-    chain: &Chain,
-    series: &[MeasuredSeries],
-    open: &[String],
-    limits: &Limits,
-) -> Result<Vec<(Lens, Vec<(String, f64)>)>> {
+fn lens_trials(chain: &Chain, series: &[MeasuredSeries], open: &[String], limits: &Limits) -> Result<Vec<LensTrial>> {
     let among = |s: &MeasuredSeries, lens: Lens| s.lens_choice == LensChoice::Settled || s.lens_choice.has(lens);
     let is_open = |lens: &Lens| series.iter().any(|s| open.contains(&s.camera) && among(s, *lens));
     let (mut trials, mut last_error) = (Vec::new(), None);

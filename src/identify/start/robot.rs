@@ -82,21 +82,14 @@ pub(in crate::identify) fn start_robot(
             "hand-eye transform {} and target pose {}",
             problem.mountings[*mounting], problem.placements[*placement]
         );
-        let known = (cameras.get(mounting).copied(), plates.get(placement).copied());
-        let is_shared = known != (None, None);
-        let solution = match known {
-            (Some(camera), Some(plate)) => HandEye { camera, plate },
-            (Some(camera), None) => {
-                closest(&poses, |p| HandEye { camera, plate: p.chain.inverse() * (camera * p.camera_from_plate) })
+        let known = [cameras.get(mounting).copied(), plates.get(placement).copied()];
+        let solution = match shared(&poses, known) {
+            Some(solution) => {
+                check_shared(adjustment, pairs, &solution, &of, given)?;
+                solution
             }
-            (None, Some(plate)) => {
-                closest(&poses, |p| HandEye { camera: (p.chain * plate) * p.camera_from_plate.inverse(), plate })
-            }
-            (None, None) => closed_form(adjustment, pairs, &poses, (*mounting, *placement), &of, given, verdicts)?,
+            None => closed_form(adjustment, pairs, &poses, (*mounting, *placement), &of, given, verdicts)?,
         };
-        if is_shared {
-            check_shared(adjustment, pairs, &solution, &of, given)?;
-        }
         cameras.insert(*mounting, solution.camera);
         plates.insert(*placement, solution.plate);
         aside.extend(set_aside(&mut adjustment.problem, pairs, &solution, given.limits));
@@ -104,6 +97,20 @@ pub(in crate::identify) fn start_robot(
     place(&mut adjustment.state.mountings, &cameras);
     place(&mut adjustment.state.placements, &plates);
     Ok(aside)
+}
+
+/// By the camera, the plate or both as others have found them; `None` where neither is known.
+fn shared(poses: &[PosePair], known: [Option<Pose>; 2]) -> Option<HandEye> {
+    Some(match known {
+        [Some(camera), Some(plate)] => HandEye { camera, plate },
+        [Some(camera), None] => {
+            closest(poses, |p| HandEye { camera, plate: p.chain.inverse() * (camera * p.camera_from_plate) })
+        }
+        [None, Some(plate)] => {
+            closest(poses, |p| HandEye { camera: (p.chain * plate) * p.camera_from_plate.inverse(), plate })
+        }
+        [None, None] => return None,
+    })
 }
 
 /// Images in use by mounting and placement, those with most images first, each image with what it and its readings say.

@@ -63,13 +63,7 @@ pub(in crate::output::report) fn histogram(record: &SolutionRecord) -> Option<St
         return None;
     }
     let axis = Axis::of(&errors);
-    let mut bins = [[0usize; 2]; BINS];
-    for e in &errors {
-        for side in 0..2 {
-            let bin = (axis.place(e[side]) * BINS as f64).floor().clamp(0.0, BINS as f64 - 1.0);
-            bins[bin as usize][side] += 1;
-        }
-    }
+    let bins = counts(&axis, &errors);
     let most = bins.iter().flatten().copied().max().unwrap_or(1).max(4) as f64;
     let mut svg =
         Svg::new(WIDTH, HEIGHT, "Histogram of the error of each held-out image before and after calibration, in mm");
@@ -98,6 +92,18 @@ pub(in crate::output::report) fn histogram(record: &SolutionRecord) -> Option<St
     svg.text([LEFT + w / 2.0, HEIGHT - 8.0], Anchor::Middle, &format!("error of an image, mm{scale}"));
     svg.text_upwards([13.0, TOP + h / 2.0], "images");
     Some(svg.finish())
+}
+
+/// How many errors before and after fall into each bin.
+fn counts(axis: &Axis, errors: &[[f64; 2]]) -> [[usize; 2]; BINS] {
+    let mut bins = [[0; 2]; BINS];
+    for e in errors {
+        for side in 0..2 {
+            let bin = (axis.place(e[side]) * BINS as f64).floor().clamp(0.0, BINS as f64 - 1.0);
+            bins[bin as usize][side] += 1;
+        }
+    }
+    bins
 }
 
 /// Residuals of every image in use, a bar each in the order of the series; left-out images are marked at the foot. With the number of bars.
