@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::error::{Code, Error, Result};
 use crate::geom::Pose;
 use crate::model::robot::Posture;
-use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries, intern, postures_of_stops, stop_name};
+use crate::problem::{BodySeen, InstrumentKind, MeasuredSeries, SeenBody, intern, postures_of_stops, stop_name};
 use crate::series::JointsBeside;
 
 /// A place is that of a marker from which it is no farther, m: what a file rounds.
@@ -79,28 +79,10 @@ impl Touches {
                 let place = || format!("series {}, stop {}", s.name, stop.image);
                 let Some(at_stop) = &at_stops[b.stop] else {
                     let what = "was measured, but its joint readings are not given";
-                    return Err(Error::new(
-                        Code::ReadingsMissing,
-                        place(),
-                        what,
-                        "fill the row of joints.csv, or remove the measurement",
-                    ));
+                    let remedy = "fill the row of joints.csv, or remove the measurement";
+                    return Err(Error::new(Code::ReadingsMissing, place(), what, remedy));
                 };
-                let seen = match (b.kind, b.seen) {
-                    (InstrumentKind::Socket, _) => TouchPlace::Unknown(intern(&mut touches.contacts, &b.instrument)),
-                    (_, seen) => {
-                        let frame = touches.frame.get_or_insert_with(|| b.instrument.clone());
-                        if *frame != b.instrument {
-                            let what = format!("is in the frame '{}', others are in '{frame}'", b.instrument);
-                            let remedy = "give the places of one work object at a time: run `frames` once for each";
-                            return Err(Error::new(Code::SeriesDisagree, place(), what, remedy));
-                        }
-                        match seen {
-                            BodySeen::Point(point) => TouchPlace::Point(point),
-                            BodySeen::Pose(pose) => TouchPlace::Pose(pose),
-                        }
-                    }
-                };
+                let seen = touches.place(b, place)?;
                 let posture = *postures[b.stop].get_or_insert_with(|| {
                     touches.postures.push(at_stop.clone());
                     touches.postures.len() - 1
@@ -118,6 +100,23 @@ impl Touches {
             return Err(Error::new(Code::FileEmpty, format!("series {}", names.join(", ")), what, remedy));
         }
         Ok(touches)
+    }
+
+    /// The place that was measured, in the one frame of all that are known.
+    fn place(&mut self, body: &SeenBody, place: impl Fn() -> String) -> Result<TouchPlace> {
+        if body.kind == InstrumentKind::Socket {
+            return Ok(TouchPlace::Unknown(intern(&mut self.contacts, &body.instrument)));
+        }
+        let frame = self.frame.get_or_insert_with(|| body.instrument.clone());
+        if *frame != body.instrument {
+            let what = format!("is in the frame '{}', others are in '{frame}'", body.instrument);
+            let remedy = "give the places of one work object at a time: run `frames` once for each";
+            return Err(Error::new(Code::SeriesDisagree, place(), what, remedy));
+        }
+        Ok(match body.seen {
+            BodySeen::Point(point) => TouchPlace::Point(point),
+            BodySeen::Pose(pose) => TouchPlace::Pose(pose),
+        })
     }
 
     /// Adds offsets to the readings of all postures, rad or m.

@@ -328,20 +328,20 @@ fn check_sheet(request: &PlateRequest, columns: u32, rows: u32, pitch_m: f64) ->
     Ok(())
 }
 
+fn check_range(v: &Viewing) -> Result<()> {
+    let sane = v.focal_px > 0.0 && v.near_m > 0.0 && v.far_m >= v.near_m && (0.0..1.4).contains(&v.tilt_rad);
+    if sane {
+        return Ok(());
+    }
+    let what =
+        format!("focal length {} px, distances {} to {} m, tilt {:.2} rad", v.focal_px, v.near_m, v.far_m, v.tilt_rad);
+    let remedy = "give positive values, the nearer distance first, and a tilt below 80 degrees";
+    Err(Error::new(Code::OptionRange, "camera", what, remedy))
+}
+
 /// Checks that the camera resolves the smallest marker at the far end and sees a whole window at the near end.
 fn check_viewing(v: &Viewing, columns: u32, rows: u32, pitch_m: f64) -> Result<f64> {
-    let sane = v.focal_px > 0.0 && v.near_m > 0.0 && v.far_m >= v.near_m && (0.0..1.4).contains(&v.tilt_rad);
-    if !sane {
-        return Err(Error::new(
-            Code::OptionRange,
-            "camera",
-            format!(
-                "focal length {} px, distances {} to {} m, tilt {:.2} rad",
-                v.focal_px, v.near_m, v.far_m, v.tilt_rad
-            ),
-            "give positive values, the nearer distance first, and a tilt below 80 degrees",
-        ));
-    }
+    check_range(v)?;
     let minor_axis_px = 2.0 * SMALL_RADIUS * pitch_m * v.focal_px / v.far_m * v.tilt_rad.cos();
     if minor_axis_px < LEAST_MINOR_AXIS_PX {
         return Err(Error::new(

@@ -7,10 +7,10 @@ use nalgebra::Vector6;
 use super::body::{BODY, Instrument};
 use super::{Image, State};
 use crate::model::camera::{Camera, MAX_PARAMETERS};
-use crate::model::joint_terms::Term;
+use crate::model::joint_terms::{JointTerm, Term};
 use crate::model::plate_modes;
 use crate::model::robot::Kinematics;
-use crate::urdf::BASE_FROM_BASE;
+use crate::urdf::{BASE_FROM_BASE, Chain, Joint};
 
 /// One scalar unknown of the dense part of the problem.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,6 +122,31 @@ impl Builder {
     fn pose(&mut self, block: &str) -> Range<usize> {
         self.block(|b| TWIST.iter().for_each(|(c, unit)| b.add(format!("{block}.{c}"), unit, f64::INFINITY)))
     }
+
+    fn twist(&mut self, joint: &Joint) {
+        let first = self.columns.len();
+        let part = if joint.states_origin() { "origin" } else { "motion" };
+        let prior = if joint.is_between_bases() { OriginPrior::UNKNOWN } else { OriginPrior::default() };
+        for (c, unit) in TWIST {
+            let sigma = if unit == "m" { prior.translation_m } else { prior.rotation_rad };
+            self.add(format!("robot/{}/{part}.{c}", joint.name), unit, sigma);
+        }
+        self.columns[first..].iter_mut().for_each(|c| c.free = joint.states_origin());
+    }
+
+    fn term(&mut self, JointTerm { reading, term, .. }: &JointTerm, chain: &Chain) {
+        let kind = chain.reading_kinds[*reading];
+        let name = format!("robot/{}.{}", chain.readings[*reading], term.name());
+        self.add(name, term.unit(kind), term.prior_sigma(kind));
+    }
+
+    fn shape(&mut self, block: &str) -> Range<usize> {
+        self.block(|b| {
+            for (k, mode) in plate_modes::NAMES.iter().enumerate() {
+                b.add(format!("{block}.{mode}"), if k < 3 { "1" } else { "m" }, plate_modes::PRIOR_SIGMA[k]);
+            }
+        })
+    }
 }
 
 /// `hand_camera` when there is one, else `hand_camera/name`.
@@ -134,27 +159,8 @@ impl Layout {
     pub fn new(state: &State, names: &Names) -> Self {
         let Names { mountings, placements, instruments, bodies, cameras, plates } = *names;
         let mut b = Builder::default();
-        let chain = &state.robot.chain;
-        let origin = OriginPrior::default();
-        let twists = b.block(|b| {
-            for joint in &chain.joints {
-                let first = b.columns.len();
-                let part = if joint.states_origin() { "origin" } else { "motion" };
-                let prior = if joint.is_between_bases() { OriginPrior::UNKNOWN } else { origin };
-                for (c, unit) in TWIST {
-                    let sigma = if unit == "m" { prior.translation_m } else { prior.rotation_rad };
-                    b.add(format!("robot/{}/{part}.{c}", joint.name), unit, sigma);
-                }
-                b.columns[first..].iter_mut().for_each(|c| c.free = joint.states_origin());
-            }
-        });
-        let terms = b.block(|b| {
-            for t in &state.robot.terms {
-                let kind = chain.reading_kinds[t.reading];
-                let unit = t.term.unit(kind);
-                b.add(format!("robot/{}.{}", chain.readings[t.reading], t.term.name()), unit, t.term.prior_sigma(kind));
-            }
-        });
+        let twists = b.block(|b| state.robot.chain.joints.iter().for_each(|joint| b.twist(joint)));
+        let terms = b.block(|b| state.robot.terms.iter().for_each(|term| b.term(term, &state.robot.chain)));
         let local_count = state.robot.terms.iter().rev().take_while(|t| matches!(t.term, Term::Local(_))).count();
         let locals = terms.end - local_count..terms.end;
         let mountings = mountings.iter().map(|m| b.pose(&named("hand_camera", m, mountings.len()))).collect();
@@ -166,17 +172,7 @@ impl Layout {
         let fields = (cameras.iter().zip(&state.cameras))
             .map(|(range, camera)| range.start + camera.parametric()..range.end)
             .collect();
-        let shapes = plates
-            .iter()
-            .map(|plate| {
-                b.block(|b| {
-                    for (k, mode) in plate_modes::NAMES.iter().enumerate() {
-                        let name = format!("{}.{mode}", named("plate_shape", plate, plates.len()));
-                        b.add(name, if k < 3 { "1" } else { "m" }, plate_modes::PRIOR_SIGMA[k]);
-                    }
-                })
-            })
-            .collect();
+        let shapes = plates.iter().map(|plate| b.shape(&named("plate_shape", plate, plates.len()))).collect();
         Self {
             columns: b.columns,
             twists,

@@ -66,6 +66,7 @@ pub(super) fn tokens(file: &TextFile, dialect: Dialect) -> Result<Vec<Token>> {
             at += to_line_end;
             continue;
         }
+        let quoted = || rest[1..to_line_end].iter().position(|c| *c == byte).ok_or_else(|| unclosed(file, line));
         let (kind, length) = match byte {
             b if !b.is_ascii_digit() && letter(rest) > 0 => (Some(TokenKind::Word), word_length(rest, letter)),
             b'\n' => (Some(TokenKind::LineEnd), 1),
@@ -80,18 +81,7 @@ pub(super) fn tokens(file: &TextFile, dialect: Dialect) -> Result<Vec<Token>> {
                 Some((value, length)) => (Some(TokenKind::Number(value)), length),
                 None => (Some(TokenKind::Mark(byte)), 1),
             },
-            b if dialect.quotes.contains(&b) => match rest[1..to_line_end].iter().position(|c| *c == b) {
-                Some(end) => (Some(TokenKind::Text), end + 2),
-                None => {
-                    let place = format!("{}:{line}", file.name);
-                    return Err(Error::new(
-                        Code::ProgramSyntax,
-                        place,
-                        "a text in quotes does not end on its line",
-                        "close the quotes",
-                    ));
-                }
-            },
+            b if dialect.quotes.contains(&b) => (Some(TokenKind::Text), quoted()? + 2),
             b => (Some(TokenKind::Mark(b)), 1),
         };
         if let Some(kind) = kind {
@@ -102,6 +92,11 @@ pub(super) fn tokens(file: &TextFile, dialect: Dialect) -> Result<Vec<Token>> {
         at += length;
     }
     Ok(out)
+}
+
+fn unclosed(file: &TextFile, line: usize) -> Error {
+    let what = "a text in quotes does not end on its line";
+    Error::new(Code::ProgramSyntax, format!("{}:{line}", file.name), what, "close the quotes")
 }
 
 /// Bytes of a letter, digit, `_` or `$` with which a text begins; 0 for anything else.

@@ -218,16 +218,8 @@ fn refuse_other_lengths(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f
             ""
         }
     );
-    let is_angle_of = |other: usize, value: f64| {
-        let (low, high) = limits(chain, other).unwrap_or((-FOREIGN_LIMITS_RAD, FOREIGN_LIMITS_RAD));
-        (low - SOFT_LIMITS_RAD..=high + SOFT_LIMITS_RAD).contains(&(value * unit.in_rad()))
-    };
-    let keeps_exchanged = |other: usize, q: &[f64]| {
-        let mut exchanged = q.to_vec();
-        exchanged.swap(reading, other);
-        keeps(reading, &exchanged, 1.0, SOFT_LIMITS_M) && is_angle_of(other, exchanged[other])
-    };
-    let Some(other) = revolute(chain).find(|&other| of_most(&|q| keeps_exchanged(other, q))) else {
+    let exchanged = |other: &usize| of_most(&|q| keeps_exchanged([reading, *other], q, unit, chain));
+    let Some(other) = revolute(chain).find(exchanged) else {
         return Err(Error::new(Code::MillimetresAsMetres, file.display(), what, remedy));
     };
     let [slide, turn] = [reading, other].map(|i| &chain.readings[i]);
@@ -235,6 +227,16 @@ fn refuse_other_lengths(file: &Path, unit: AngleUnit, chain: &Chain, rows: &[&[f
     let what = format!("{what}; {turn} reads {low} to {high}: with both columns exchanged both keep their limits");
     let remedy = format!("exchange the column names {slide} and {turn}; if they are right, {remedy}");
     Err(Error::new(Code::JointOrderWrong, file.display(), what, remedy))
+}
+
+/// True where a slide and a turn keep their limits with their readings exchanged.
+fn keeps_exchanged([slide, turn]: [usize; 2], q: &[f64], unit: AngleUnit, chain: &Chain) -> bool {
+    let mut exchanged = q.to_vec();
+    exchanged.swap(slide, turn);
+    let (low, high) = limits(chain, turn).unwrap_or((-FOREIGN_LIMITS_RAD, FOREIGN_LIMITS_RAD));
+    let angles = low - SOFT_LIMITS_RAD..=high + SOFT_LIMITS_RAD;
+    fits(chain, std::iter::once(slide), &exchanged, 1.0, SOFT_LIMITS_M)
+        && angles.contains(&(exchanged[turn] * unit.in_rad()))
 }
 
 /// Name and range of the revolute reading that reaches furthest from zero.

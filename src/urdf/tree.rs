@@ -48,14 +48,10 @@ impl RobotDescription {
         let mut chain =
             Chain { robot: self.name.clone(), base: base.to_string(), tip: tip.to_string(), ..Chain::empty() };
         let (up, down) = self.path(base, tip)?;
+        let impossible = |what: String, remedy| Error::new(Code::ChainImpossible, self.path.display(), what, remedy);
         if up.len() + down.len() > MOST_JOINTS {
             let what = format!("has {} joints between \"{base}\" and \"{tip}\"", up.len() + down.len());
-            return Err(Error::new(
-                Code::ChainImpossible,
-                self.path.display(),
-                what,
-                "choose a base and a tip of the arm alone",
-            ));
+            return Err(impossible(what, "choose a base and a tip of the arm alone"));
         }
         for element in up {
             let motion = self.chain_joint(element, &mut chain)?;
@@ -67,12 +63,7 @@ impl RobotDescription {
         }
         if chain.readings.is_empty() {
             let what = format!("no joint moves between \"{base}\" and \"{tip}\"");
-            return Err(Error::new(
-                Code::ChainImpossible,
-                self.path.display(),
-                what,
-                "choose another base or tip link",
-            ));
+            return Err(impossible(what, "choose another base or tip link"));
         }
         self.refuse_millimetres(&chain)?;
         chain.masses = self.stated_masses(&chain);

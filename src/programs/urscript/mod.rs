@@ -230,27 +230,8 @@ impl Script<'_> {
         let routine = matches!(word, b"def" | b"thread");
         match word {
             _ if assigned => return false,
-            _ if begins && routine => {
-                self.way.routine_begins();
-                let name = self
-                    .reader
-                    .ahead(1)
-                    .map_or_else(String::new, |t| String::from_utf8_lossy(self.reader.text(t)).into_owned());
-                self.flow.routine_begins(name, &mut self.now, &(Active::new(self.setting.tool), Stands::default()));
-                if word == b"thread" {
-                    self.time_passes();
-                }
-            }
-            _ if begins => {
-                self.way.branches_begin();
-                let kind = match word {
-                    b"if" => Branching::If,
-                    b"switch" => Branching::Cases,
-                    b"while" if self.is_endless() => Branching::LoopForever,
-                    _ => Branching::Loop,
-                };
-                self.flow.begin(&mut self.now, kind);
-            }
+            _ if begins && routine => self.routine_begins(word),
+            _ if begins => self.branches_begin(word),
             b"else" | b"elif" | b"case" | b"default" => {
                 self.way.next_branch();
                 self.flow.next(&mut self.now, matches!(word, b"else" | b"default"));
@@ -278,6 +259,27 @@ impl Script<'_> {
             self.blocks.push(routine);
         }
         true
+    }
+
+    fn routine_begins(&mut self, word: &[u8]) {
+        self.way.routine_begins();
+        let name = self.reader.ahead(1).map(|t| String::from_utf8_lossy(self.reader.text(t)).into_owned());
+        let first = (Active::new(self.setting.tool), Stands::default());
+        self.flow.routine_begins(name.unwrap_or_default(), &mut self.now, &first);
+        if word == b"thread" {
+            self.time_passes();
+        }
+    }
+
+    fn branches_begin(&mut self, word: &[u8]) {
+        self.way.branches_begin();
+        let kind = match word {
+            b"if" => Branching::If,
+            b"switch" => Branching::Cases,
+            b"while" if self.is_endless() => Branching::LoopForever,
+            _ => Branching::Loop,
+        };
+        self.flow.begin(&mut self.now, kind);
     }
 
     /// `while True:`
