@@ -63,17 +63,8 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
         let quieter = quieter_series(noise_found, setting, (k, reading)).filter(|_| !readings_are_poses);
         let kind = fit.state.robot.chain.reading_kinds[reading];
         let readings_are_computed = of.readings_are_computed();
-        let weight = match sigma {
-            s if s > limits.joint_noise => Weight::Gate,
-            // Then they are not those that the robot had.
-            s if s >= limits.unusual_joint_noise && readings_are_computed => Weight::Gate,
-            s if (s >= limits.unusual_joint_noise || quieter.is_some())
-                && is_told(noise_found, (k, reading), accuracy, limits) =>
-            {
-                Weight::Note
-            }
-            _ => return None,
-        };
+        let told = || is_told(noise_found, (k, reading), accuracy, limits);
+        let weight = weight(sigma, (readings_are_computed, quieter.is_some()), told, limits)?;
         let problem = &fit.problem;
         let errors = |i: usize| accuracy.per_image_mm[i].map(|[_, calibrated]| calibrated);
         let sigma_px = |i: usize| {
@@ -97,6 +88,23 @@ pub(super) fn check(fit: &Fit, accuracy: &Accuracy, setting: &CheckContext) -> V
         })
     };
     setting.series.iter().enumerate().filter(|(k, _)| says_noise_first(fit, *k)).filter_map(of_series).collect()
+}
+
+/// How much a joint noise weighs; `None` where it is usual, or not told.
+fn weight(
+    sigma: f64,
+    (is_of_computed, is_quieter_elsewhere): (bool, bool),
+    told: impl Fn() -> bool,
+    limits: &Limits,
+) -> Option<Weight> {
+    let is_unusual = sigma >= limits.unusual_joint_noise;
+    match () {
+        () if sigma > limits.joint_noise => Some(Weight::Gate),
+        // Then they are not those that the robot had.
+        () if is_unusual && is_of_computed => Some(Weight::Gate),
+        () if (is_unusual || is_quieter_elsewhere) && told() => Some(Weight::Note),
+        () => None,
+    }
 }
 
 /// The other series of the robot with the least noise of a reading, where this one is far noisier.

@@ -81,22 +81,11 @@ fn counted(touches: usize) -> String {
 
 /// The tool is told by turning it: by what the tip's orientations differ within each group of touches whose place is common.
 fn orientations(robot: &KnownRobot, touches: &Touches, limits: &Limits) -> Result<()> {
-    let mut scatter = Matrix3::zeros();
-    let mut groups: Vec<Vec<usize>> = vec![Vec::new(); touches.contacts.len() + 1];
-    for (k, t) in touches.all.iter().enumerate() {
-        // The tool is seen whole.
-        if matches!(t.seen, TouchPlace::Pose(_)) {
-            return Ok(());
-        }
-        groups[if let TouchPlace::Unknown(contact) = t.seen { contact } else { touches.contacts.len() }].push(k);
+    // The tool is seen whole.
+    if touches.all.iter().any(|t| matches!(t.seen, TouchPlace::Pose(_))) {
+        return Ok(());
     }
-    for group in groups.iter().filter(|g| !g.is_empty()) {
-        let rotations: Vec<_> =
-            group.iter().map(|&k| robot.at(&touches.postures[touches.all[k].posture]).0.rotation).collect();
-        let mean = rotations.iter().sum::<Matrix3<f64>>() / rotations.len() as f64;
-        scatter += rotations.iter().map(|r| (r - mean).transpose() * (r - mean)).sum::<Matrix3<f64>>();
-    }
-    let eigen = (scatter / touches.all.len() as f64).symmetric_eigen();
+    let eigen = scatter_of_rotations(robot, touches).symmetric_eigen();
     let least = eigen.eigenvalues.imin();
     let [turned, most] = [least, eigen.eigenvalues.imax()].map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
     if turned >= limits.touches_turned_rad {
@@ -122,6 +111,22 @@ fn orientations(robot: &KnownRobot, touches: &Touches, limits: &Limits) -> Resul
         )
     };
     Err(Error::new(Code::TouchesNotTurned, "touches", what, remedy))
+}
+
+/// Mean square of what the tip's rotations differ by from the means of their groups.
+fn scatter_of_rotations(robot: &KnownRobot, touches: &Touches) -> Matrix3<f64> {
+    let known = touches.contacts.len();
+    let mut groups: Vec<Vec<Matrix3<f64>>> = vec![Vec::new(); known + 1];
+    for t in &touches.all {
+        let group = if let TouchPlace::Unknown(contact) = t.seen { contact } else { known };
+        groups[group].push(robot.at(&touches.postures[t.posture]).0.rotation);
+    }
+    let mut scatter = Matrix3::zeros();
+    for rotations in groups.iter().filter(|g| !g.is_empty()) {
+        let mean = rotations.iter().sum::<Matrix3<f64>>() / rotations.len() as f64;
+        scatter += rotations.iter().map(|r| (r - mean).transpose() * (r - mean)).sum::<Matrix3<f64>>();
+    }
+    scatter / touches.all.len() as f64
 }
 
 /// RMS extents of points about their middle along their principal axes, largest first, m.

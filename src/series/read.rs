@@ -326,15 +326,12 @@ fn pictured(
     for stop in stops.stops.iter_mut().filter(|_| stops.key == StopKey::Stop) {
         name_image(stop, &names);
     }
-    let mut missing = Vec::new();
-    for (stop, line) in stops.stops.iter_mut().zip(lines) {
-        // What is no image by its name is looked at like one: what is wrong with it is said of it then.
-        let directly = on_disk.get(&stop.image).or_else(|| others_on_disk.get(&stop.image)).cloned();
-        match directly.or_else(|| within(images, &stop.image)) {
-            Some(path) => stop.path = Some(path),
-            None => missing.push((*line, stop.image.clone())),
-        }
-    }
+    // What is no image by its name is looked at like one: what is wrong with it is said of it then.
+    let path_of = |image: &str| {
+        let directly = on_disk.get(image).or_else(|| others_on_disk.get(image)).cloned();
+        directly.or_else(|| within(images, image))
+    };
+    let missing = find_paths(stops, lines, path_of);
     let remedy = |name: &str| match (similar(name, &names), similar(name, &others)) {
         (Some(there), _) => format!("\"{there}\" is there: write the name exactly"),
         (None, Some(there)) => format!("\"{there}\" is there, and its format is not read: {CONVERT}"),
@@ -361,6 +358,18 @@ fn pictured(
     notices.extend((!unnamed.is_empty()).then(|| unlisted(images, csv, &unnamed)));
     let Light { dark, white } = light;
     Ok(Source::Images { folder: images.to_path_buf(), dark, white })
+}
+
+/// Gives every stop the path of its image; returns line and name of those without one.
+fn find_paths(stops: &mut Stops, lines: &[u64], path_of: impl Fn(&str) -> Option<PathBuf>) -> Vec<(u64, String)> {
+    let mut missing = Vec::new();
+    for (stop, line) in stops.stops.iter_mut().zip(lines) {
+        match path_of(&stop.image) {
+            Some(path) => stop.path = Some(path),
+            None => missing.push((*line, stop.image.clone())),
+        }
+    }
+    missing
 }
 
 /// Refuses a series most of whose images are of formats that are not read: `others` names these files.

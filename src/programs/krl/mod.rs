@@ -428,6 +428,17 @@ impl Module<'_> {
         self.way.leave(Left { file, line, name: name.to_owned(), why }, same_posture, &mut self.now.1);
     }
 
+    fn stands_at_root(&self) -> Understood<()> {
+        let at_root = match &self.root {
+            FrameIs::Known(root) => *root == Pose::identity(),
+            FrameIs::Unset => true,
+            FrameIs::Unknown(_) => false,
+        };
+        let words = "$ROBROOT is not zero: $BASE does not stand in the foot of the robot \
+                     (with --base of a link that is the world, leave out the file that sets it)";
+        if at_root { Ok(()) } else { Err(Why::new(LeftReason::FrameUnknown, words)) }
+    }
+
     fn kind(&self, a: &Aggregate, frames: &Frames) -> Understood<TargetKind> {
         let axes = self.setting.axes;
         if a.has(&AXIS_NAMES) {
@@ -443,16 +454,7 @@ impl Module<'_> {
             return Err(Why::new(LeftReason::NotATarget, words));
         }
         frames.is_on_flange().map_err(|words| Why::new(LeftReason::ToolUnknown, words))?;
-        let at_root = match &self.root {
-            FrameIs::Known(root) => *root == Pose::identity(),
-            FrameIs::Unset => true,
-            FrameIs::Unknown(_) => false,
-        };
-        if !at_root {
-            let words = "$ROBROOT is not zero: $BASE does not stand in the foot of the robot \
-                         (with --base of a link that is the world, leave out the file that sets it)";
-            return Err(Why::new(LeftReason::FrameUnknown, words));
-        }
+        self.stands_at_root()?;
         if let Some((name, value)) = a.foreign(axes).filter(|_| !self.setting.axes_apart) {
             return Err(Why::external(&name, value));
         }

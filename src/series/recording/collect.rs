@@ -186,14 +186,7 @@ impl<'a> Collector<'a> {
                 }
             },
         };
-        let stop = SeriesStop {
-            path: Some(self.images.join(&image)),
-            image: image.clone(),
-            raw_readings: Some(joints.positions.iter().zip(self.factors).map(|(q, factor)| q / factor).collect()),
-            placement: DEFAULT_PLACEMENT.to_string(),
-            time_s: Some(time as f64 * 1e-9),
-            ..SeriesStop::default()
-        };
+        let stop = self.stop(&image, &joints.positions, time);
         let report = StopReport {
             image,
             speed: joints.speed,
@@ -204,6 +197,18 @@ impl<'a> Collector<'a> {
         };
         self.taken.rows.insert(time, (stop, report));
         Ok(())
+    }
+
+    /// A picture with the positions of the joints in SI units at a time, ns.
+    fn stop(&self, image: &str, positions: &[f64], time: i64) -> SeriesStop {
+        SeriesStop {
+            path: Some(self.images.join(image)),
+            image: image.to_owned(),
+            raw_readings: Some(positions.iter().zip(self.factors).map(|(q, factor)| q / factor).collect()),
+            placement: DEFAULT_PLACEMENT.to_string(),
+            time_s: Some(time as f64 * 1e-9),
+            ..SeriesStop::default()
+        }
     }
 
     /// Which pictures can be read and how sharp they are, and their mean where that is wanted.
