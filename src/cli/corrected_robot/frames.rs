@@ -95,10 +95,7 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     }
     let tool_told = tool.is_some() || !nothing;
     let given = Given { tool: tool.or_else(|| nothing.then(Pose::identity)), plate };
-    let mut fitted = fit(&robot, &touches, &given, &found.limits).map_err(|e| named(e, args))?;
-    if !touches.is_pose(0) && tool.is_none() {
-        fitted.tools[0].rotation = orientation(args)?;
-    }
+    let fitted = fitted(args, (&robot, &touches), &given, (&found.limits, tool.is_some()))?;
     let subject = args.touches.first().unwrap_or(&args.from).display().to_string();
     let (limits, subject) = (&found.limits, subject.as_str());
     let judged = FittedFrames { robot: &robot, touches: &touches, given: &given, fit: &fitted, limits, subject };
@@ -127,12 +124,24 @@ pub fn run(args: &FramesArgs) -> Result<Verdict> {
     say!("{}", text(&args.from, &made, &fitted, &touches, &robot));
     zeros.iter().for_each(|zeros| say_line!("{}", zeros.line()));
     say_moved(&moved, touches.all.len());
-    for notice in &notices {
-        say_line!("note      {}", notice.coded());
-    }
+    notices.iter().for_each(|notice| say_line!("note      {}", notice.coded()));
     say::findings(&findings);
     say_line!("results   {} ({})", args.out.display(), files.keys().cloned().collect::<Vec<_>>().join(", "));
     Ok(if findings.iter().all(|f| f.weight == Weight::Note) { Verdict::Good } else { Verdict::GateFailed })
+}
+
+/// The fit; a tool of which the touches tell its point alone has the orientation that is given.
+fn fitted(
+    args: &FramesArgs,
+    (robot, touches): (&KnownRobot, &Touches),
+    given: &Given,
+    (limits, tool_is_given): (&Limits, bool),
+) -> Result<FrameFit> {
+    let mut fitted = fit(robot, touches, given, limits).map_err(|e| named(e, args))?;
+    if !touches.is_pose(0) && !tool_is_given {
+        fitted.tools[0].rotation = orientation(args)?;
+    }
+    Ok(fitted)
 }
 
 /// The result by the names of its files: the frames as the controller takes them, the URDF with those in its base, and what was made.

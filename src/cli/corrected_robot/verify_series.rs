@@ -36,35 +36,41 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let read = |urdf: &Path| Inputs::read(urdf, &args.series, ends);
     let judged_inputs = read(&args.urdf)?;
     let options = recording.options(&[])?;
-    let Some(file) = &args.nominal else {
-        let inputs = judged_inputs.with_recordings(&options)?;
-        require_readings(&inputs)?;
-        let model = model(args, inputs.chain.clone())?;
-        let Observed { series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
-        let zeros = zeros(args, &model, &files)?;
-        let seen =
-            Verified { series: &with_added(series, &missing(zeros.as_ref())), files: &files, zeros: zeros.as_ref() };
-        let found = match judged((&model.robot, &args.urdf), seen.series, &model.limits)? {
-            JudgedSeries::Images(found) => found,
-            JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
-        };
-        let images: Vec<&JudgedImage> = found.images.iter().collect();
-        say_line!("{}", line("model", &args.urdf, &images));
-        return Ok(weigh(args, &model, (&seen, &images, &found.plate_sizes()), None).verdict());
-    };
+    let Some(file) = &args.nominal else { return alone(args, judged_inputs.with_recordings(&options)?) };
     // Poses of a controller are those of the model that is in it, whichever robot is judged by them.
     let nominal_inputs = read(file)?;
     require_same_joints(&judged_inputs.chain, &nominal_inputs.chain, &args.urdf, file)?;
     let model = model(args, judged_inputs.chain)?;
-    let Observed { chain, series, files, .. } =
-        nominal_inputs.with_recordings(&options)?.observe(&model.limits, &progress::of_series())?;
+    beside_nominal(args, &model, (file, nominal_inputs.with_recordings(&options)?))
+}
+
+/// The model without another one beside it.
+fn alone(args: &VerifyArgs, inputs: Inputs) -> Result<Verdict> {
+    require_readings(&inputs)?;
+    let model = model(args, inputs.chain.clone())?;
+    let Observed { series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
     let zeros = zeros(args, &model, &files)?;
+    let series = with_added(series, &missing(zeros.as_ref()));
+    let seen = Verified { series: &series, files: &files, zeros: zeros.as_ref() };
+    let found = match judged((&model.robot, &args.urdf), &series, &model.limits)? {
+        JudgedSeries::Images(found) => found,
+        JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
+    };
+    let images: Vec<&JudgedImage> = found.images.iter().collect();
+    say_line!("{}", line("model", &args.urdf, &images));
+    Ok(weigh(args, &model, (&seen, &images, &found.plate_sizes()), None).verdict())
+}
+
+/// The model and the nominal one, by the images that both predict.
+fn beside_nominal(args: &VerifyArgs, model: &Model, (file, inputs): (&Path, Inputs)) -> Result<Verdict> {
+    let Observed { chain, series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
+    let zeros = zeros(args, model, &files)?;
     let missing = missing(zeros.as_ref());
     let series = in_told_postures(&model.robot, &with_added(series, &missing), &model.limits);
     let seen = Verified { series: &series, files: &files, zeros: zeros.as_ref() };
     let found = match judged((&model.robot, &args.urdf), &series, &model.limits)? {
         JudgedSeries::Images(found) => found,
-        JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, &model, &seen, &other)?.verdict()),
+        JudgedSeries::OtherZeros(other) => return Ok(of_other_zeros(args, model, &seen, &other)?.verdict()),
     };
     let as_shown: Vec<f64> = missing.iter().map(|offset| -offset).collect();
     let (robot, nominal) =
@@ -72,7 +78,7 @@ pub(super) fn run(args: &VerifyArgs, recording: &RecordingArgs) -> Result<Verdic
     let (images, nominal) = of_both(&found.images, &nominal);
     let ratio = compare(args, file, &images, &nominal)?;
     let gain = Gain { ratio, nominal: &robot, of: "images", at: at_images(&model.robot, &series) };
-    Ok(weigh(args, &model, (&seen, &images, &found.plate_sizes()), Some(gain)).verdict())
+    Ok(weigh(args, model, (&seen, &images, &found.plate_sizes()), Some(gain)).verdict())
 }
 
 /// The model of the flags. One of them that means nothing is refused before images are read.

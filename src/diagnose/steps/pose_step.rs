@@ -42,7 +42,7 @@ use crate::diagnose::kind::{CheckContext, Weight};
 use crate::fit::Fit;
 use crate::problem::{InstrumentKind, Problem, stop_name};
 use crate::series::CameraMount;
-use crate::urdf::JointKind;
+use crate::urdf::{Chain, JointKind};
 
 pub fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<Finding> {
     let fit = setting.with_noise_found(fit);
@@ -167,24 +167,17 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
         Order::Whole => Displacement::InAll,
     };
     let images: Vec<String> = step.shown.iter().map(name).collect();
-    let limits = setting.limits;
-    let explains_most = step.explains_most;
-    let weight = |matters: bool| if matters && explains_most { Weight::Gate } else { Weight::Note };
+    let (limits, explains_most) = (setting.limits, step.explains_most);
     match step.changed {
         Changed::Zero(reading) => {
-            let chain = &fit.state.robot.chain;
-            let (joint, kind) = (chain.readings[reading].clone(), chain.reading_kinds[reading]);
-            let repeats_to = if kind == JointKind::Prismatic { limits.displaced_m } else { limits.displaced_rad };
-            let offset = (step.change[0], step.covariance[(0, 0)].sqrt());
-            let weight = weight(offset.0.abs() > repeats_to);
-            let (stops, share) = (images, step.share);
-            Some(ZeroMoved { joint, kind, series, displacement, stops, offset, share, weight }.into())
+            let of = (series, displacement, images);
+            Some(zero_moved(step, &fit.state.robot.chain, reading, of, limits).into())
         }
         Changed::Focal(camera) => refocused(step, fit, camera, images.into_iter().next()?, explains_most, setting),
         Changed::Centre(camera) => Some(ImagesShifted::of(step, problem, camera, images).into()),
         Changed::Place { first, .. } => {
             let matters = step.size(0).0 > limits.displaced_m;
-            Some(PlaceMisstated::of(step, problem, first, (series, images), weight(matters)).into())
+            Some(PlaceMisstated::of(step, problem, first, (series, images), weight(step, matters)).into())
         }
         _ => {
             let (distance_m, angle_rad) = (step.size(0), (step.change.len() > 3).then(|| step.size(3)));
@@ -203,12 +196,31 @@ fn finding(step: &Step, fit: &Fit, setting: &CheckContext) -> Option<Finding> {
                     angle_rad,
                     share: step.share,
                     explains_most,
-                    weight: weight(matters),
+                    weight: weight(step, matters),
                 }
                 .into(),
             )
         }
     }
+}
+
+fn zero_moved(
+    step: &Step,
+    chain: &Chain,
+    reading: usize,
+    (series, displacement, stops): (String, Displacement, Vec<String>),
+    limits: &Limits,
+) -> ZeroMoved {
+    let (joint, kind) = (chain.readings[reading].clone(), chain.reading_kinds[reading]);
+    let repeats_to = if kind == JointKind::Prismatic { limits.displaced_m } else { limits.displaced_rad };
+    let offset = (step.change[0], step.covariance[(0, 0)].sqrt());
+    let matters = offset.0.abs() > repeats_to;
+    let weight = weight(step, matters);
+    ZeroMoved { joint, kind, series, displacement, stops, offset, share: step.share, weight }
+}
+
+fn weight(step: &Step, matters: bool) -> Weight {
+    if matters && step.explains_most { Weight::Gate } else { Weight::Note }
 }
 
 /// Names of the sockets that moved; none where it is another body.
