@@ -1,7 +1,7 @@
 //! The table of checks: at which stage each runs, and what its findings explain away.
 
 use super::finding::Finding;
-use super::kind::{CheckContext, Weight};
+use super::kind::{CheckContext, Kind, Weight};
 use super::left_out::reading_circles::ReadingCircles;
 use super::left_out::{
     exchanged_pictures, exchanged_readings, exchanged_targets, left_out_bodies, left_out_images, left_out_observations,
@@ -15,7 +15,7 @@ use super::{
     stated_noise, tag_size, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::fit::Fit;
 use crate::problem::{Adjustment, Problem};
 
@@ -177,7 +177,7 @@ pub const CHECKS: &[Check] = &[
     check("shifted_measurements", Stage::LeftOut(|a, s| found(shifted_measurements::check(a, s)))),
     check("shifted_readings", Stage::WrongPairs(|a, r, s| found(shifted_readings::check(a, r, s)))),
     check("repeated_measurements", Stage::LeftOut(|a, s| found(repeated_measurements::check(a, s)))),
-    check("left_out_bodies", Stage::BesideLeftOut(|a, f, s| found(left_out_bodies::check(a, f, s)))),
+    check("left_out_bodies", Stage::BesideLeftOut(|a, f, s| found(left_out_bodies::check(a, why_left_out(f), s)))),
     check("measurement_scatter", Stage::Fit(|a, b, s| found(measurement_scatter::check(a, b, s)))),
     check("left_out_observations", Stage::LeftOut(|a, s| found(left_out_observations::check(a, s)))),
     check("mirror_image", Stage::Fit(|a, b, s| found(mirror_image::check(a, b, s)))),
@@ -220,6 +220,16 @@ pub const CHECKS: &[Check] = &[
     check("small_gain", Stage::Fit(|a, b, s| found(small_gain::check(a, b, s)))),
     check("odd_image", Stage::Fit(|a, b, s| found(odd_image::check(a, b, s)))),
 ];
+
+/// Code and place of what says why measurements of a tracker were left out.
+fn why_left_out(above: &[Vec<Finding>]) -> Vec<(Code, String)> {
+    let why = |found: &Finding| match found {
+        Finding::ExchangedTargets(found) => Some((found.code(), found.place())),
+        Finding::ShiftedMeasurements(found) => Some((found.code(), found.place())),
+        _ => None,
+    };
+    above.iter().flatten().filter_map(why).collect()
+}
 
 /// True of what readings computed from poses of a tool, or in a frame, look like: there they are the finding. `mountings`: names of those of
 /// the series with such poses; another is loose by itself.

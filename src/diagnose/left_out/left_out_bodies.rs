@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use crate::diagnose::finding::Finding;
 use crate::diagnose::kind::{CheckContext, Kind, Quantity, Subject, Weight, some_of};
 use crate::error::Code;
 use crate::problem::{Adjustment, BodyRejection, stop_name};
@@ -25,8 +24,12 @@ pub struct MeasurementsLeftOut {
     pub weight: Weight,
 }
 
-/// Beside what is known of them.
-pub fn check(adjustment: &Adjustment, known: &[Vec<Finding>], setting: &CheckContext) -> Option<MeasurementsLeftOut> {
+/// Beside findings that say why, by code and place.
+pub fn check(
+    adjustment: &Adjustment,
+    explained_by: Vec<(Code, String)>,
+    setting: &CheckContext,
+) -> Option<MeasurementsLeftOut> {
     let problem = &adjustment.problem;
     let (mut named, mut instruments) = (Vec::new(), BTreeSet::new());
     // What was written again and again has a finding of its own.
@@ -47,14 +50,8 @@ pub fn check(adjustment: &Adjustment, known: &[Vec<Finding>], setting: &CheckCon
     };
     let is_one = instruments.len() == 1 && problem.instruments.len() > 1 && out >= setting.limits.moved_images;
     let all_of = instruments.first().filter(|_| is_one).map(|name| (*name).clone());
-    let why = |found: &Finding| match found {
-        Finding::ExchangedTargets(found) => Some((found.code(), found.place())),
-        Finding::ShiftedMeasurements(found) => Some((found.code(), found.place())),
-        _ => None,
-    };
     // A refusal stands alone.
-    let known = known.iter().flatten().filter(|_| weight != Weight::Refusal);
-    let explained_by = known.filter_map(why).collect();
+    let explained_by = if weight == Weight::Refusal { Vec::new() } else { explained_by };
     Some(MeasurementsLeftOut { named, all, all_of, explained_by, weight })
 }
 
