@@ -12,7 +12,7 @@ use super::scene::{PlacedScene, Scene};
 use super::setting::Setting;
 use super::viewpoint::{ViewRange, Viewpoint};
 use super::visibility::{VisibilityLimits, seen_markers};
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Quantity, Result};
 use crate::geom::Pose;
 use crate::model::inverse::{random_readings, reading_limits, solve_from};
 use crate::series::CameraMount;
@@ -87,6 +87,12 @@ impl CandidateCounts {
         self.out_of_reach += other.out_of_reach;
         self.colliding += other.colliding;
         self.hidden += other.hidden;
+    }
+
+    /// Why postures that reach a view fell out.
+    fn of_postures(&self) -> Vec<Quantity> {
+        let of = [("colliding", self.colliding), ("hidden", self.hidden)];
+        of.map(|(name, count)| Quantity::new(name, count as f64, "1")).to_vec()
     }
 }
 
@@ -382,17 +388,18 @@ fn all_collide(setting: &Setting, scene: &Scene, options: &CandidateOptions, tal
     };
     let remedy = "check boxes and table (--box, --table-z-m), allow less clearance (--clearance-mm) or thinner links \
                   (--link-radius-mm), or put the plate elsewhere";
-    Error::new(Code::PlanCollides, "plan: collisions", what, remedy)
+    Error { quantities: tally.of_postures(), ..Error::new(Code::PlanCollides, "plan: collisions", what, remedy) }
 }
 
 /// In most postures that reach a workable view something stands before the plate, and the others collide.
-fn all_hidden(CandidateCounts { colliding, hidden, .. }: &CandidateCounts) -> Error {
+fn all_hidden(tally: &CandidateCounts) -> Error {
+    let CandidateCounts { colliding, hidden, .. } = *tally;
     let what = format!(
         "of {} postures that reach a workable view {colliding} collide, and in {hidden} a box or the arm hides the plate from the camera",
         colliding + hidden
     );
     let remedy = "check the boxes (--box) and where plate and camera are (--plate-pose, --hand-camera), or ask for fewer markers (--markers)";
-    Error::new(Code::PlanViewless, "plan: sight", what, remedy)
+    Error { quantities: tally.of_postures(), ..Error::new(Code::PlanViewless, "plan: sight", what, remedy) }
 }
 
 /// Random postures over the joint ranges that touch nothing: the workspace over which accuracy is meant.

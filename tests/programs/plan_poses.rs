@@ -271,7 +271,13 @@ fn nothing_stands_between_the_camera_and_the_markers_of_a_planned_pose() {
     // A lid over the plate hides it from everywhere.
     let lid = Pose::from_xyz_rpy([0.0, 0.0, 0.05], [0.0; 3]);
     request.scene.boxes = vec![OrientedBox { pose: plate * lid, half_m: Vector3::new(0.3, 0.3, 0.005) }];
-    assert_eq!(plan(&request).map(|_| ()).unwrap_err().code, Code::PlanViewless);
+    let refused = plan(&request).map(|_| ()).unwrap_err();
+    let [colliding, hidden] = [0, 1].map(|k| refused.quantities[k].value);
+    assert_eq!(
+        (refused.code, hidden > colliding),
+        (Code::PlanViewless, true),
+        "{colliding} collide, {hidden} are hidden"
+    );
 }
 
 /// A plate from 0.15 m to far behind its middle: no lens is sharp there, unless it is said to be.
