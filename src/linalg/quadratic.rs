@@ -34,6 +34,29 @@ struct Rows {
 }
 
 impl Rows {
+    /// Of rows and bounds, `a x <= bound`; so many of the first are equations.
+    fn of(bounds: &[(f64, f64)], rows: &[LinearRow]) -> (Self, usize) {
+        let mut a = Self::default();
+        let dense = |c: &[f64], sign: f64| c.iter().map(|v| sign * v).enumerate().collect::<Vec<_>>().into_iter();
+        for r in rows.iter().filter(|r| r.low == r.high) {
+            a.push(dense(&r.coefficients, 1.0), r.low);
+        }
+        let equations = a.bound.len();
+        for r in rows.iter().filter(|r| r.low != r.high) {
+            if r.high.is_finite() {
+                a.push(dense(&r.coefficients, 1.0), r.high);
+            }
+            if r.low.is_finite() {
+                a.push(dense(&r.coefficients, -1.0), -r.low);
+            }
+        }
+        for (k, (low, high)) in bounds.iter().enumerate() {
+            a.push(std::iter::once((k, 1.0)), *high);
+            a.push(std::iter::once((k, -1.0)), -low);
+        }
+        (a, equations)
+    }
+
     fn push(&mut self, coefficients: impl Iterator<Item = (usize, f64)>, bound: f64) {
         for (column, value) in coefficients.filter(|(_, v)| *v != 0.0) {
             self.row.push(self.bound.len());
@@ -42,6 +65,15 @@ impl Rows {
         }
         self.bound.push(bound);
     }
+}
+
+/// What is not zero on and above the diagonal.
+fn upper_triangle(hessian: &DMatrix<f64>) -> CscMatrix {
+    let n = hessian.nrows();
+    let upper = (0..n).flat_map(|j| (0..=j).map(move |i| (i, j))).filter(|&(i, j)| hessian[(i, j)] != 0.0);
+    let (rows, columns): (Vec<usize>, Vec<usize>) = upper.unzip();
+    let values = rows.iter().zip(&columns).map(|(&i, &j)| hessian[(i, j)]).collect();
+    CscMatrix::new_from_triplets(n, n, rows, columns, values)
 }
 
 /// The point that minimises `x' hessian x / 2 + gradient' x` over `bounds` (low, high of every unknown) and `rows`.
@@ -55,30 +87,10 @@ pub fn minimise_quadratic(
     rows: &[LinearRow],
 ) -> Result<DVector<f64>, NotSolved> {
     let n = gradient.len();
-    let mut a = Rows::default();
-    let dense = |c: &[f64], sign: f64| c.iter().map(|v| sign * v).enumerate().collect::<Vec<_>>().into_iter();
-    for r in rows.iter().filter(|r| r.low == r.high) {
-        a.push(dense(&r.coefficients, 1.0), r.low);
-    }
-    let equations = a.bound.len();
-    for r in rows.iter().filter(|r| r.low != r.high) {
-        if r.high.is_finite() {
-            a.push(dense(&r.coefficients, 1.0), r.high);
-        }
-        if r.low.is_finite() {
-            a.push(dense(&r.coefficients, -1.0), -r.low);
-        }
-    }
-    for (k, (low, high)) in bounds.iter().enumerate() {
-        a.push(std::iter::once((k, 1.0)), *high);
-        a.push(std::iter::once((k, -1.0)), -low);
-    }
+    let (a, equations) = Rows::of(bounds, rows);
     let m = a.bound.len();
     let matrix = CscMatrix::new_from_triplets(m, n, a.row, a.column, a.value);
-    let upper = (0..n).flat_map(|j| (0..=j).map(move |i| (i, j))).filter(|&(i, j)| hessian[(i, j)] != 0.0);
-    let (rows_p, columns_p): (Vec<usize>, Vec<usize>) = upper.unzip();
-    let values_p = rows_p.iter().zip(&columns_p).map(|(&i, &j)| hessian[(i, j)]).collect();
-    let p = CscMatrix::new_from_triplets(n, n, rows_p, columns_p, values_p);
+    let p = upper_triangle(hessian);
     let cones = [ZeroConeT(equations), NonnegativeConeT(m - equations)];
     let settings = DefaultSettings { verbose: false, max_iter: 200, ..DefaultSettings::default() };
     let mut solver = DefaultSolver::new(&p, gradient.as_slice(), &matrix, &a.bound, &cones, settings)

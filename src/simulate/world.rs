@@ -187,15 +187,35 @@ impl World<'_> {
 
     fn into_series(self, seen: Vec<AcceptedStop>, held_out: Vec<HeldOutRecord>) -> SimulatedSeries {
         let request = self.request;
+        let truth = self.truth(&seen, held_out);
+        let stop = |s: &AcceptedStop| SeriesStop {
+            image: s.observations.image.clone(),
+            raw_readings: Some(s.raw.clone()),
+            placement: placement_name(s.placement),
+            ..SeriesStop::default()
+        };
+        let joints = request.chain.readings.clone();
+        SimulatedSeries {
+            manifest: manifest(request),
+            plate: request.plate.clone(),
+            stops: Stops { joints, stops: seen.iter().map(stop).collect(), ..Stops::default() },
+            observations: seen.into_iter().map(|s| s.observations).collect(),
+            true_plate: self.true_plate,
+            truth,
+        }
+    }
+
+    /// All that was put in.
+    fn truth(&self, seen: &[AcceptedStop], held_out: Vec<HeldOutRecord>) -> Truth {
+        let request = self.request;
         let chain = &request.chain;
-        let names = |at: usize| format!("placement_{at}");
         let record = |s: &AcceptedStop| TrueStop {
             image: s.observations.image.clone(),
-            placement: names(s.placement),
+            placement: placement_name(s.placement),
             joint_noise: s.noise.clone(),
             camera_from_plate: TruePose::from(&s.camera_from_plate),
         };
-        let truth = Truth {
+        Truth {
             format: 1,
             seed: request.seed,
             base: chain.base.clone(),
@@ -206,29 +226,19 @@ impl World<'_> {
             pixel_sigma_px: Some(request.pixel_sigma_px),
             camera: request.camera.clone(),
             camera_pose: TruePose::from(&self.setup.camera),
-            plate_poses: self.setup.plates.iter().enumerate().map(|(k, p)| (names(k), p.into())).collect(),
+            plate_poses: self.setup.plates.iter().enumerate().map(|(k, p)| (placement_name(k), p.into())).collect(),
             twists: twists_by_name(&self.actual),
             terms: terms_by_name(&self.actual),
             marker_errors_m: marker_errors(&request.plate, &self.true_plate),
             fault: None,
             stops: seen.iter().map(record).collect(),
             held_out,
-        };
-        let stop = |s: &AcceptedStop| SeriesStop {
-            image: s.observations.image.clone(),
-            raw_readings: Some(s.raw.clone()),
-            placement: names(s.placement),
-            ..SeriesStop::default()
-        };
-        SimulatedSeries {
-            manifest: manifest(request),
-            plate: request.plate.clone(),
-            stops: Stops { joints: chain.readings.clone(), stops: seen.iter().map(stop).collect(), ..Stops::default() },
-            observations: seen.into_iter().map(|s| s.observations).collect(),
-            true_plate: self.true_plate,
-            truth,
         }
     }
+}
+
+fn placement_name(at: usize) -> String {
+    format!("placement_{at}")
 }
 
 impl SimulatedSeries {

@@ -1,13 +1,25 @@
 //! The comparison of estimators as Markdown.
 
-use std::fmt::Write;
-
 use crate::assess::Ratio;
-use crate::identify::{Comparison, HeldOut};
+use crate::identify::{Comparison, ComparisonRow, HeldOut};
 
 /// A ratio with its interval, a dash where there is none.
 pub fn ratio_text(ratio: Option<Ratio>) -> String {
     ratio.map_or_else(|| "-".into(), |r| r.to_string())
+}
+
+fn markdown_row(row: &ComparisonRow, with_truth: bool) -> String {
+    let held = |h: Option<HeldOut>| match h {
+        None => " - | - | - |".to_owned(),
+        Some(h) => format!(" {:.3} | {:.4} | {} |", h.rms_px, h.rms_mm, ratio_text(h.to_joint)),
+    };
+    let truth = match row.truth {
+        _ if !with_truth => String::new(),
+        None => " no solution | - |".to_owned(),
+        Some(t) => format!(" {:.4} | {:.4} |", t.flange_mm, t.camera_mm),
+    };
+    let estimator = format!("| {} {} |", row.estimator.letter(), row.estimator.title());
+    estimator + &held(row.by_image) + &held(row.by_region) + &truth + "\n"
 }
 
 /// A comparison as a Markdown table.
@@ -29,24 +41,7 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
     out.push_str(if with_truth { " flange mm | camera mm |\n" } else { "\n" });
     out.push_str("|---|---|---|---|---|---|---|");
     out.push_str(if with_truth { "---|---|\n" } else { "\n" });
-    let held = |h: Option<HeldOut>| match h {
-        None => " - | - | - |".to_owned(),
-        Some(h) => format!(" {:.3} | {:.4} | {} |", h.rms_px, h.rms_mm, ratio_text(h.to_joint)),
-    };
-    for row in &comparison.rows {
-        let _ = write!(out, "| {} {} |", row.estimator.letter(), row.estimator.title());
-        out.push_str(&held(row.by_image));
-        out.push_str(&held(row.by_region));
-        if with_truth {
-            match row.truth {
-                None => out.push_str(" no solution | - |"),
-                Some(t) => {
-                    let _ = write!(out, " {:.4} | {:.4} |", t.flange_mm, t.camera_mm);
-                }
-            }
-        }
-        out.push('\n');
-    }
+    comparison.rows.iter().for_each(|row| out += &markdown_row(row, with_truth));
     if with_truth {
         out.push_str(
             "\nflange: RMS error of the flange relative to the plate at readings that took no part, plate and tool frames aligned; \
