@@ -159,6 +159,18 @@ fn along_links(robot: &Robot, radius_m: f64, described: &[Capsule]) -> Vec<Capsu
     all
 }
 
+/// From the tip to the camera.
+fn camera_in_hand(chain: &Chain, tip_from_camera: &Pose, radius_m: f64) -> Capsule {
+    let moving = chain.joints.iter().filter(|j| j.kind != JointKind::Fixed).count();
+    Capsule {
+        name: "camera".into(),
+        joint: Some(chain.joints.len() - 1),
+        order: moving + 1,
+        ends_m: [Vector3::zeros(), tip_from_camera.translation],
+        radius_m,
+    }
+}
+
 /// Capsules of the URDF's collision geometry, for [`SceneOptions::described`].
 pub fn described(capsules: &[CarriedCapsule], chain: &Chain) -> Vec<Capsule> {
     let moving = |upto: usize| chain.joints[..=upto].iter().filter(|j| j.kind != JointKind::Fixed).count();
@@ -186,22 +198,13 @@ impl Scene {
         let mut capsules = options.described.clone();
         capsules.extend(along_links(robot, radius, &options.described));
         capsules.sort_by_key(|c| c.order);
-        let last = robot.chain.joints.len() - 1;
-        let moving = robot.chain.joints.iter().filter(|j| j.kind != JointKind::Fixed).count();
         let plate = plate_box(&setting.plate);
         let placed = setting.placements.iter().map(|p| plate.placed(&p.1)).collect();
         let cell = Cell::of(&robot.chain);
         let (mut on_base, mut boxes, mut plates, mut plates_in_hand) = (None, Vec::new(), Vec::new(), Vec::new());
         match setting.mount {
             CameraMount::Hand => {
-                let ends_m = [Vector3::zeros(), setting.mounting.translation];
-                capsules.push(Capsule {
-                    name: "camera".into(),
-                    joint: Some(last),
-                    order: moving + 1,
-                    ends_m,
-                    radius_m: options.camera_radius_m,
-                });
+                capsules.push(camera_in_hand(&robot.chain, &setting.mounting, options.camera_radius_m));
                 plates = placed;
             }
             CameraMount::Fixed => {

@@ -157,21 +157,21 @@ impl Fault {
         FAULTS.iter().find(|e| e.fault == self).unwrap_or(&FAULTS[0])
     }
 
+    fn require_enough(self, stops: usize, joints: usize) -> Result<()> {
+        if stops >= 6 && joints >= 6 {
+            return Ok(());
+        }
+        let place = format!("fault {}", self.expectation().name);
+        let what = format!("{stops} stops and {joints} joints are too few to show it");
+        Err(Error::new(Code::OptionConflict, place, what, "take 16 stops of a 6-axis arm"))
+    }
+
     /// Puts the fault into a series before it is written.
     ///
     /// # Errors
     /// When the series has too few stops or joints to show it.
     pub fn apply(self, series: &mut SimulatedSeries) -> Result<()> {
-        let (stops, joints) = (series.stops.stops.len(), series.stops.joints.len());
-        if stops < 6 || joints < 6 {
-            let what = format!("{stops} stops and {joints} joints are too few to show it");
-            return Err(Error::new(
-                Code::OptionConflict,
-                format!("fault {}", self.expectation().name),
-                what,
-                "take 16 stops of a 6-axis arm",
-            ));
-        }
+        self.require_enough(series.stops.stops.len(), series.stops.joints.len())?;
         series.truth.fault = Some(self.expectation().name.to_owned());
         match self {
             Self::DegreesAsRadians => series.manifest.joint_unit = Some(AngleUnit::Rad),

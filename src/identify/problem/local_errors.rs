@@ -18,18 +18,9 @@ pub(super) fn local_terms(
     least_share: f64,
 ) -> Vec<JointTerm> {
     let on_robot: Vec<&Posture> = stops.iter().filter_map(|s| s.posture.as_ref()).collect();
-    let mut pairs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); readings];
-    let mut missed = vec![0_usize; readings];
-    for (b, later) in on_robot.iter().enumerate() {
-        for (a, earlier) in on_robot[..b].iter().enumerate() {
-            let [common, nearly] = related_readings(earlier, later, fewest_in_common);
-            common.into_iter().for_each(|r| pairs[r].push((a, b)));
-            nearly.into_iter().for_each(|r| missed[r] += 1);
-        }
-    }
     let mut of_readings: Vec<Vec<JointTerm>> = Vec::new();
-    for (reading, pairs) in pairs.into_iter().enumerate() {
-        if pairs.len() < BEYOND_CHANCE * missed[reading] {
+    for (reading, (pairs, missed)) in pairs_in_common(&on_robot, readings, fewest_in_common).into_iter().enumerate() {
+        if pairs.len() < BEYOND_CHANCE * missed {
             continue;
         }
         let mut sets = joined(on_robot.len(), pairs.into_iter());
@@ -53,6 +44,19 @@ pub(super) fn local_terms(
     let mut terms: Vec<JointTerm> = of_readings.into_iter().take_while(is_paid).flatten().collect();
     terms.sort_by_key(|t| t.reading);
     terms
+}
+
+/// For every reading the pairs of stops that have it in common, and how many nearly do.
+fn pairs_in_common(stops: &[&Posture], readings: usize, fewest_in_common: usize) -> Vec<(Vec<(usize, usize)>, usize)> {
+    let mut all = vec![(Vec::new(), 0); readings];
+    for (b, later) in stops.iter().enumerate() {
+        for (a, earlier) in stops[..b].iter().enumerate() {
+            let [common, nearly] = related_readings(earlier, later, fewest_in_common);
+            common.into_iter().for_each(|r| all[r].0.push((a, b)));
+            nearly.into_iter().for_each(|r| all[r].1 += 1);
+        }
+    }
+    all
 }
 
 /// Sum of the squares of the local basis functions of every reading at a posture.

@@ -139,13 +139,16 @@ pub fn camera_text(
         depths_m[0],
         depths_m[1]
     );
-    let text = format.text(name, &near);
-    // A directive of YAML stands before all else.
-    let text = match text.strip_prefix("%YAML:1.0\n---\n") {
-        Some(rest) => format!("%YAML:1.0\n---\n{remark}{rest}"),
-        None => remark + &text,
-    };
+    let text = remarked(&remark, &format.text(name, &near));
     Ok(CameraText { text, loss_px: Some([rms_px, worst_px]) })
+}
+
+/// With a remark first, but for a directive of YAML, which stands before all else.
+fn remarked(remark: &str, text: &str) -> String {
+    match text.strip_prefix("%YAML:1.0\n---\n") {
+        Some(rest) => format!("%YAML:1.0\n---\n{remark}{rest}"),
+        None => format!("{remark}{text}"),
+    }
 }
 
 /// Reads a camera file of any of the formats; of several cameras in it that with the name `wanted`.

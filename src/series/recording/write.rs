@@ -147,14 +147,9 @@ fn write_stops(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Res
     let mut recording = Recording::create(path)?;
     let mut notices = Vec::new();
     let marks: BTreeMap<&str, &ImageMarks> = shown.marks.iter().map(|m| (m.image.as_str(), m)).collect();
-    let with_both: Vec<(usize, &SeriesStop, &Vec<f64>, &PathBuf)> = series
-        .stops
-        .stops
-        .iter()
-        .zip(shown.readings)
-        .enumerate()
-        .filter_map(|(i, (stop, readings))| Some((i, stop, readings.as_ref()?, stop.path.as_ref()?)))
-        .collect();
+    let all = series.stops.stops.iter().zip(shown.readings).enumerate();
+    let with_both: Vec<(usize, &SeriesStop, &Vec<f64>, &PathBuf)> =
+        all.filter_map(|(i, (stop, readings))| Some((i, stop, readings.as_ref()?, stop.path.as_ref()?))).collect();
     let left_out = series.stops.stops.len() - with_both.len();
     let images: Vec<&Path> = with_both.iter().map(|(.., image)| image.as_path()).collect();
     let refused = decodable::refused(&images);
@@ -172,17 +167,13 @@ fn write_stops(path: &Path, series: &Series, shown: RecordingContent<'_>) -> Res
     let times = times(&usable.iter().map(|(_, stop, ..)| *stop).collect::<Vec<_>>());
     for (time, (i, stop, readings, image)) in times.into_iter().zip(usable) {
         for k in -(STANDING_NS / PERIOD_NS)..=STANDING_NS / PERIOD_NS {
-            // The image is written at its time, among the joint states.
             recording.joint_state(time + k * PERIOD_NS, shown.joints, readings)?;
+            // The image is written at its time, among the joint states.
             if k == 0 {
                 recording.image(time, image)?;
-                if let Some(camera) = shown.camera {
-                    recording.camera_info(time, camera)?;
-                }
+                shown.camera.map_or(Ok(()), |camera| recording.camera_info(time, camera))?;
                 recording.transforms(time, i, shown.frames)?;
-                if let Some(marks) = marks.get(stop.image.as_str()) {
-                    recording.marks(time, marks)?;
-                }
+                marks.get(stop.image.as_str()).map_or(Ok(()), |marks| recording.marks(time, marks))?;
             }
         }
     }
