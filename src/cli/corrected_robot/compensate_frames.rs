@@ -17,7 +17,7 @@ use crate::programs::compensate::Compensated;
 use crate::programs::{
     KnownError, Language, MeasuredFrames, MeasuredTool, Program, ProgramSetting, RobotFrames, SameFrames,
 };
-use crate::urdf::Chain;
+use crate::urdf::{Chain, Joint};
 
 /// One of the calibrated robots.
 pub(super) struct Side<'a> {
@@ -301,17 +301,8 @@ pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Found> {
         Err(error) => return Ok(Err(NoSolution::Unusable(error))),
     };
     let exported = exported_robot(&record)?.as_exported().chain;
-    let origin = |name: &str| exported.joints.iter().find(|j| j.name == name).map(|j| j.origin);
     let chain = &side.robot.chain;
-    let same = chain.readings == record.robot.readings
-        && chain.tip == record.robot.tip
-        && chain.joints.iter().filter(|j| j.drive.is_some()).all(|j| {
-            origin(&j.name).is_some_and(|o| {
-                let (rad, m) = o.distance(&j.origin);
-                rad < SAME_ORIGIN && m < SAME_ORIGIN
-            })
-        });
-    if same || is_alone_of(&record, side) {
+    if is_same(chain, &record, &exported) || is_alone_of(&record, side) {
         return Ok(Ok(record));
     }
     let differs = |what: String, remedy: String| Error::new(Code::SolutionDiffers, path.display(), what, remedy);
@@ -329,6 +320,20 @@ pub(super) fn solution(side: &Side, recorded: Option<&Path>) -> Result<Found> {
         (Some(_), NoSolution::OfOther(error) | NoSolution::Unusable(error)) => Err(error),
         (_, none) => Ok(Err(none)),
     }
+}
+
+/// True for a chain with the moving joints of a solution where it has them.
+fn is_same(chain: &Chain, record: &SolutionRecord, exported: &Chain) -> bool {
+    let origin = |name: &str| exported.joints.iter().find(|j| j.name == name).map(|j| j.origin);
+    let is_there = |j: &Joint| {
+        origin(&j.name).is_some_and(|o| {
+            let (rad, m) = o.distance(&j.origin);
+            rad < SAME_ORIGIN && m < SAME_ORIGIN
+        })
+    };
+    chain.readings == record.robot.readings
+        && chain.tip == record.robot.tip
+        && chain.joints.iter().filter(|j| j.drive.is_some()).all(is_there)
 }
 
 /// What is judged of the model of a solution, where that is not the whole: a URDF without its compensation.toml.

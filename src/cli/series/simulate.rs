@@ -204,7 +204,7 @@ fn conditions(args: &SimulateArgs) -> Result<ImagingConditions> {
     Ok(conditions)
 }
 
-fn request(args: &SimulateArgs) -> Result<WorldRequest> {
+fn check_ranges(args: &SimulateArgs) -> Result<()> {
     let sane = args.near_m > 0.0
         && args.far_m >= args.near_m
         && (0.0..85.0).contains(&args.tilt_deg)
@@ -221,6 +221,11 @@ fn request(args: &SimulateArgs) -> Result<WorldRequest> {
         let remedy = "a stop and a placement at least; noise from 0 to 100 mrad, px and mm";
         return Err(Error::new(Code::OptionRange, "simulate", what, remedy));
     }
+    Ok(())
+}
+
+fn request(args: &SimulateArgs) -> Result<WorldRequest> {
+    check_ranges(args)?;
     let chain = read_chain(&args.urdf, args.base.as_deref(), args.tip.as_deref())?;
     Ok(WorldRequest {
         camera: lens_camera(lens(&args.lens)?, args.width_px, args.height_px, args.field_deg.to_radians()),

@@ -76,6 +76,17 @@ impl BodyMoved {
     }
 }
 
+impl BodyMoved {
+    fn images_in_words(&self) -> String {
+        let (count, end) = (self.images.len(), |image: Option<&String>| image.cloned().unwrap_or_default());
+        match self.by_turns {
+            // Between the first and the last stand others.
+            true => format!("{count} images ({})", some_of(&self.images, MOST_NAMED)),
+            false => format!("{count} images, {} to {}", end(self.images.first()), end(self.images.last())),
+        }
+    }
+}
+
 impl Kind for BodyMoved {
     fn code(&self) -> Code {
         match self.moved {
@@ -125,17 +136,7 @@ impl Kind for BodyMoved {
 
     fn seen(&self) -> String {
         let [before, after] = &self.between;
-        let images = if self.by_turns {
-            // Between the first and the last stand others.
-            format!("{} images ({})", self.images.len(), some_of(&self.images, MOST_NAMED))
-        } else {
-            format!(
-                "{} images, {} to {}",
-                self.images.len(),
-                self.images.first().map_or("", String::as_str),
-                self.images.last().map_or("", String::as_str),
-            )
-        };
+        let images = self.images_in_words();
         match &self.moved {
             Moved::Plate { distance_m, angle_rad } | Moved::Camera { distance_m, angle_rad } if self.by_turns => {
                 format!(

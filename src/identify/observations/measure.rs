@@ -79,16 +79,7 @@ fn seen_at(
         Source::NoImages => return Err(no_images(series)),
         Source::Cameras(_) => return Err(several_cameras(series)),
     };
-    let said = |s: &StopObservations| s.left_out.as_ref().map(|why| (why.to_string(), s.remedy.clone()));
-    let failures: Vec<Option<(String, Option<String>)>> = seen.iter().map(said).collect();
-    let stops = series.stops.stops.iter().zip(&seen).zip(&failures);
-    require_some(
-        &format!("series {}", series.name),
-        stops.map(|((stop, s), failure)| {
-            let unused = failure.as_ref().map(|(what, remedy)| Unused { what, remedy: remedy.as_deref() });
-            (stop.image.as_str(), s.observations.len(), unused)
-        }),
-    )?;
+    require_seen(series, &seen)?;
     let size_px = image_size(series, found_size)?;
     let mut stops = Vec::with_capacity(readings.len());
     for (k, ((stop, readings), seen)) in series.stops.stops.iter().zip(readings).zip(seen.drain(..)).enumerate() {
@@ -102,6 +93,18 @@ fn seen_at(
     let measured = measured_series(series, lens, size_px, centroid, stops);
     let postures = other_postures(series, chain, (&measured.stops, &bodies));
     Ok(MeasuredWithNotices { series: MeasuredSeries { plate, bodies, lengths, postures, ..measured }, notices })
+}
+
+/// Refuses a series at no stop of which anything was seen.
+fn require_seen(series: &Series, seen: &[StopObservations]) -> Result<()> {
+    let said = |s: &StopObservations| s.left_out.as_ref().map(|why| (why.to_string(), s.remedy.clone()));
+    let failures: Vec<Option<(String, Option<String>)>> = seen.iter().map(said).collect();
+    let stops = series.stops.stops.iter().zip(seen).zip(&failures);
+    let stops = stops.map(|((stop, s), failure)| {
+        let unused = failure.as_ref().map(|(what, remedy)| Unused { what, remedy: remedy.as_deref() });
+        (stop.image.as_str(), s.observations.len(), unused)
+    });
+    require_some(&format!("series {}", series.name), stops)
 }
 
 /// The observations of every stop, of a series that has them instead of images.
