@@ -245,8 +245,8 @@ fn fit(
     };
     let outcome = with_taken_back(outcome, free, aside, (&components, &options.limits));
     let outcome = without_contradicting(outcome, &components, &options.limits);
-    let outcome = with_let_go(outcome, &components, &options.limits);
-    let outcome = with_agreeing(outcome, &components, &options.limits);
+    let outcome = with_markers_let_go(outcome, &components, &options.limits);
+    let outcome = with_agreeing_lengths(outcome, &components, &options.limits);
     if components.joint { without_unidentified_noise(outcome, &components.settings) } else { (outcome.ended(), None) }
 }
 
@@ -265,7 +265,7 @@ fn set_noise(start: &mut Adjustment, near: Option<&Adjustment>, joint_noise: Joi
     }
 }
 
-/// Takes back what was left out before and fits.
+/// Takes images and measurements back that fit the robot that was found.
 fn with_taken_back(
     mut outcome: Outcome,
     free: &FreePoses,
@@ -282,8 +282,8 @@ fn with_taken_back(
     outcome
 }
 
-/// Lets go what the fit does not need to hold.
-fn with_let_go(mut outcome: Outcome, components: &ComponentOptions, limits: &Limits) -> Outcome {
+/// Lets go of markers that lie far off.
+fn with_markers_let_go(mut outcome: Outcome, components: &ComponentOptions, limits: &Limits) -> Outcome {
     for _ in 0..ROUNDS {
         if !let_go(&mut outcome.adjustment, limits) {
             break;
@@ -293,8 +293,8 @@ fn with_let_go(mut outcome: Outcome, components: &ComponentOptions, limits: &Lim
     outcome
 }
 
-/// Takes in what was left out and agrees.
-fn with_agreeing(mut outcome: Outcome, components: &ComponentOptions, limits: &Limits) -> Outcome {
+/// With the measured lengths that a fit without them does not contradict.
+fn with_agreeing_lengths(mut outcome: Outcome, components: &ComponentOptions, limits: &Limits) -> Outcome {
     if !take_agreeing(&mut outcome, limits) {
         return outcome;
     }
