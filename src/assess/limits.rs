@@ -71,6 +71,13 @@ limits! {
     times_quieter_noise: f64 = 4.0;
     /// Joint noise from which that is said, rad or m: robots repeat to some 0.1 mrad.
     noisier_from: f64 = 1e-4;
+    /// Apparent shift of a plate across the optical axis, m, from which cameras at the same stops contradict each other: lens, light and focus make
+    /// hundredths of a millimetre, compressed pictures of webcams a tenth.
+    cameras_apart_across_m: f64 = 2e-4;
+    /// The same along the axis, where a plate is seen the less well.
+    cameras_apart_along_m: f64 = 5e-4;
+    /// Times these from which the cameras are not to be trusted.
+    times_cameras_apart: f64 = 2.5;
     /// Held-out error over what the joint noise does to the flange, below which the hold-out contradicts it: of fifteen stops, either is known to a
     /// fifth.
     held_out_of_noise: f64 = 0.5;

@@ -9,10 +9,10 @@ use super::left_out::{
 };
 use super::steps::{loose, pose_step};
 use super::{
-    camera_model, camera_pattern, contradicted_distances, extrapolates, few_images, focus, held_near_nominal,
-    held_parameters, joint_noise, length_standard, marker_off, measurement_scatter, mirror_image, no_gain, odd_image,
-    parameter_off, plate_size, reading_ratio, repeated_measurements, rounded_readings, scatter, small_gain,
-    stated_noise, tag_size, undetermined, zeros_off,
+    camera_model, camera_pattern, cameras_contradict, contradicted_distances, extrapolates, few_images, focus,
+    held_near_nominal, held_parameters, joint_noise, length_standard, marker_off, measurement_scatter, mirror_image,
+    no_gain, odd_image, parameter_off, plate_size, reading_ratio, repeated_measurements, rounded_readings, scatter,
+    small_gain, stated_noise, tag_size, undetermined, zeros_off,
 };
 use crate::assess::{Accuracy, Uncertainty};
 use crate::error::{Code, Error, Result};
@@ -68,6 +68,9 @@ pub const CHECKS: &[Check] = &[
             (Finding::Displaced(own), Finding::JointNoiseLarge(noise)) => {
                 noise.is_of_what_moved_in(&own.series, own.weight)
             }
+            (Finding::Displaced(own), Finding::CamerasContradict(apart)) => {
+                apart.is_of_what_moved_in(&own.series, own.weight)
+            }
             (Finding::Displaced(own), Finding::DoubtedSize(size)) => size.is_of_what_moved_in(&own.series, own.weight),
             (Finding::FocusChange(own), Finding::LooseMounting(loose)) => own.explains_two_places_of(&loose.mounting),
             (Finding::FocusChange(own), Finding::NoiseContradicted(noise)) => noise.is_explained_by(own.weight),
@@ -114,6 +117,9 @@ pub const CHECKS: &[Check] = &[
         // Another focal length looks like a plate that stands elsewhere.
         explains: |own, other| match (own, other) {
             (Finding::FocusChange(own), Finding::Displaced(moved)) => own.looks_like(moved),
+            (Finding::FocusChange(own), Finding::CamerasContradict(apart)) => {
+                apart.is_of_focus_of(&own.camera, own.weight)
+            }
             _ => false,
         },
         ..check("focus", Stage::FreePoses(|p, s| found(focus::check(p, s))))
@@ -141,6 +147,7 @@ pub const CHECKS: &[Check] = &[
     check("camera_model", Stage::FreePoses(|p, s| found(camera_model::check(p, s)))),
     check("camera_pattern", Stage::Fit(|a, b, s| found(camera_pattern::check(a, b, s)))),
     check("few_images", Stage::Fit(|a, b, s| found(few_images::check(a, b, s)))),
+    check("cameras_contradict", Stage::Fit(|a, b, s| found(cameras_contradict::check(a, b, s)))),
     check("joint_noise", Stage::Fit(|a, b, s| found(joint_noise::check(a, b, s)))),
     Check {
         explains: |own, other| match (own, other) {

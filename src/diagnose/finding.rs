@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::camera_model::CameraModelMisfit;
 use super::camera_pattern::ResidualPattern;
+use super::cameras_contradict::CamerasContradict;
 use super::computed_postures::ComputedPostures;
 use super::contradicted_distances::ContradictedDistances;
 use super::extrapolates::Extrapolates;
@@ -82,6 +83,7 @@ findings! {
     ComputedPostures,
     ContradictedDistances,
     ContradictedLengths,
+    CamerasContradict,
     Displaced,
     DoubtedSize,
     ExchangedPictures,

@@ -118,7 +118,8 @@ fn quieter_series(fit: &Fit, setting: &CheckContext, (series, reading): (usize, 
     is_noisier.then(|| (setting.series[quietest].name.clone(), quiet))
 }
 
-fn of_same_noise(fit: &Fit, setting: &CheckContext, series: usize) -> Vec<String> {
+/// Series with the same joint noise: those of the same stops.
+pub(super) fn of_same_noise(fit: &Fit, setting: &CheckContext, series: usize) -> Vec<String> {
     let is_same = |(k, _): &(usize, &MeasuredSeries)| fit.problem.noise_of(*k) == fit.problem.noise_of(series);
     setting.series.iter().enumerate().filter(is_same).map(|(_, of)| of.name.clone()).collect()
 }

@@ -11,6 +11,7 @@
 
 mod camera_model;
 mod camera_pattern;
+mod cameras_contradict;
 mod checks;
 mod computed_postures;
 mod contradicted_distances;
@@ -55,6 +56,7 @@ mod zeros_off;
 
 pub use camera_model::CameraModelMisfit;
 pub use camera_pattern::{ResidualPattern, residual_pattern};
+pub use cameras_contradict::CamerasContradict;
 pub use checks::{CHECKS, Check, Diagnosis, Stage, follows_from_tool};
 pub use computed_postures::ComputedPostures;
 pub use contradicted_distances::{ContradictedDistances, DistanceOff};

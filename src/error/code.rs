@@ -343,6 +343,7 @@ codes! {
         FocusChanged "focus_changed" "focus or zoom changed during the series",
         ReadingsRounded "readings_rounded" "joint readings were rounded to a step that is as large as the joint noise",
         JointNoiseLarge "joint_noise_large" "the joint noise is larger than robots have, or far larger than in another series of the robot",
+        CamerasContradict "cameras_contradict" "cameras that see the same stops contradict each other from stop to stop",
         JointNoiseContradicted "joint_noise_contradicted" "the data show another joint noise than the stated one",
         PlateMoved "plate_moved" "the plate was moved: images were left out",
         CameraMoved "camera_moved" "the camera was moved on its mount: images were left out",

@@ -304,6 +304,20 @@ fn what_single_images_are_off_by_is_no_joint_noise() {
     assert!((0.75..1.25).contains(&(of_joints.sqrt() / JOINT_SIGMA)), "{}", of_joints.sqrt());
 }
 
+/// What they contradict each other by is taken up by their images, one by one: no other check sees it.
+#[test]
+fn cameras_that_contradict_each_other_are_named() {
+    let told = |across: f64, along: f64| {
+        let solution = solved(&seen_displaced(&[CameraMount::Hand; 2], 30, 3, [1e-5, 1e-5, across, along]));
+        let found = solution.findings.iter().find(|f| f.code() == Code::CamerasContradict);
+        found.map(|f| (f.fails(), f.subjects().len()))
+    };
+    assert_eq!(told(2e-5, 5e-5), None);
+    assert_eq!(told(3.5e-4, 5e-5), Some((false, 4)));
+    assert_eq!(told(1.5e-3, 5e-5), Some((true, 4)));
+    assert_eq!(told(2e-5, 3e-3), Some((true, 4)));
+}
+
 /// Mean of the squared normalised errors over many worlds, with its 99 % interval, for every mixture of two cameras.
 #[test]
 #[ignore = "minutes: 200 worlds of each mixture of cameras"]
