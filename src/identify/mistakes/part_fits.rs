@@ -15,6 +15,11 @@ use crate::problem::MeasuredSeries;
 
 /// Why images of one mounting and placement that miss by `misfit` do not fit.
 pub(in crate::identify) fn broken(suspects: &Suspects, misfit: f64, of: &str) -> Option<Error> {
+    in_parts(suspects, misfit, of).or_else(|| not_read(suspects, misfit))
+}
+
+/// Images of which a part fits by itself, and the others agree on what is elsewhere, or fit by themselves, too.
+pub(in crate::identify) fn in_parts(suspects: &Suspects, misfit: f64, of: &str) -> Option<Error> {
     let pairs: Vec<PosePair> = suspects.pairs.iter().map(|(_, pair)| *pair).collect();
     let left = suspects.limits.mistake_explains * misfit;
     let bound = suspects.limits.suspicious_misfit.min(left);
@@ -30,11 +35,10 @@ pub(in crate::identify) fn broken(suspects: &Suspects, misfit: f64, of: &str) ->
         Some(Part::of(solution, &fits, is_first))
     });
     let part = parts.min_by_key(|part| (part.missed, part.others.len()));
-    let by_parts = part.and_then(|part| {
+    part.and_then(|part| {
         let both = || solved(part.others.clone()).map(|_| part.unnamed(of, n, misfit));
         part.named(suspects).or_else(both)
-    });
-    by_parts.or_else(|| not_read(suspects, misfit))
+    })
 }
 
 /// Readings that stay the same for a while.

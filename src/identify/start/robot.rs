@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use nalgebra::Matrix6;
 
 use crate::assess::Limits;
-use crate::diagnose::{Finding, Mistake, ReadingRatio, RowsOf};
+use crate::diagnose::{Finding, Mistake, MistakeKind, ReadingRatio, RowsOf};
 use crate::error::{Code, Error, Quantity, Result};
 use crate::fit::FreePoses;
 use crate::geom::{Pose, log_so3};
 use crate::identify::bodies::rows_of::rows_of_images;
-use crate::identify::mistakes::part_fits::broken;
+use crate::identify::mistakes::part_fits::{broken, in_parts};
 use crate::identify::mistakes::suspects::Suspects;
 use crate::identify::start::zeros::place_zeros;
 use crate::identify::start_verdict::{StartReached, StartVerdict};
@@ -250,6 +250,12 @@ fn check_shared(
 /// Refuses what does not fit: for the mistake that explains it, or because it is too far off.
 fn check_fit(suspects: &Suspects, misfit: f64, of: &str, how: &str) -> Result<()> {
     if let Some((kind, misfit_undone)) = suspects.better_than(misfit) {
+        // What is slid and hardly turned leaves directions as they were and changes distances, as other links do.
+        if matches!(kind, MistakeKind::Lengths { .. })
+            && let Some(moved) = in_parts(suspects, misfit, of)
+        {
+            return Err(moved);
+        }
         let rows_of = match rows_of_images(
             suspects.problem,
             suspects.robot,
