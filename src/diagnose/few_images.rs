@@ -5,12 +5,15 @@ use super::lost_images::LostImages;
 use crate::assess::Accuracy;
 use crate::error::Code;
 use crate::fit::Fit;
+use crate::problem::different_readings;
 
 /// Few images of the robot.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FewImages {
     /// Images of the robot.
     pub images: usize,
+    /// Different readings among them.
+    pub different: usize,
     /// True where nothing but trackers and contacts measured: stops of the robot are counted.
     pub are_stops: bool,
     /// What cost many images, if that is so.
@@ -19,10 +22,14 @@ pub struct FewImages {
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Option<FewImages> {
     let are_stops = setting.on_robot == 0;
-    let images = if are_stops { fit.problem.used_stops().len() } else { setting.on_robot };
-    (images < setting.limits.few_images).then(|| {
-        let lost = LostImages::of(&fit.problem, setting.limits);
-        FewImages { images, are_stops, lost }
+    let (problem, limits) = (&fit.problem, setting.limits);
+    let images = if are_stops { problem.used_stops().len() } else { setting.on_robot };
+    let stops = problem.used_stops().into_iter().filter_map(|s| problem.stops[s].posture.as_ref());
+    let different =
+        different_readings(stops.map(|posture| posture.readings.as_slice()), limits.joint_noise, limits.few_images);
+    (images.min(different) < limits.few_images).then(|| {
+        let lost = LostImages::of(problem, limits);
+        FewImages { images, different: different.min(images), are_stops, lost }
     })
 }
 
@@ -37,7 +44,8 @@ impl Kind for FewImages {
 
     fn quantities(&self) -> Vec<Quantity> {
         let images = Quantity::new("images", self.images as f64, "1");
-        [images].into_iter().chain(self.lost.as_ref().map(LostImages::quantity)).collect()
+        let different = Quantity::new("different", self.different as f64, "1");
+        [images, different].into_iter().chain(self.lost.as_ref().map(LostImages::quantity)).collect()
     }
 
     fn place(&self) -> String {
@@ -45,8 +53,13 @@ impl Kind for FewImages {
     }
 
     fn seen(&self) -> String {
+        let at = if self.different < self.images {
+            format!(" at {} different readings", self.different)
+        } else {
+            String::new()
+        };
         format!(
-            "{} {} of the robot are few: expect the prior (nominal model) to decide much of the result",
+            "{} {}{at} of the robot are few: expect the prior (nominal model) to decide much of the result",
             self.images,
             if self.are_stops { "stops" } else { "images" }
         )

@@ -18,7 +18,7 @@ use crate::identify::mistakes::readings::{columns_undone, mirrored_signs_undone,
 use crate::identify::mistakes::suspects::some_of;
 use crate::linalg::lower_median;
 use crate::model::robot::Robot;
-use crate::problem::{Adjustment, BodyMeasurement, BodySeen, InstrumentKind, Problem};
+use crate::problem::{Adjustment, BodyMeasurement, BodySeen, InstrumentKind, Problem, different_readings};
 
 /// What was seen with a mistake undone, and its name.
 type Undone = (Vec<BodyAtStop>, MistakeKind);
@@ -53,6 +53,11 @@ pub(super) fn mistake(
     if !(is_suspicious || is_contradicted(problem, measured, of_all, limits))
         || robot.chain.pose_coordinates().is_some()
     {
+        return None;
+    }
+    // Any change of the readings fits what was measured again and again at a few.
+    let (readings, fewest) = (given.iter().map(|s| s.readings.as_slice()), limits.hand_eye_images);
+    if different_readings(readings, limits.joint_noise, fewest) < fewest {
         return None;
     }
     let stops: Vec<usize> = given.iter().map(|s| s.stop).collect::<BTreeSet<usize>>().into_iter().collect();
