@@ -7,8 +7,7 @@ use super::boards::lattices::find_lattice;
 use super::boards::seen::{BoardSeen, SQUARES, trimmed};
 use super::corners::lattice::BoardSize;
 use super::tags::code::Reader;
-use super::tags::quads::Quad;
-use super::tags::scan::{all_dictionaries, certain, passes, scan, usual_dictionaries};
+use super::tags::scan::{all_dictionaries, certain, coded, scan, usual_dictionaries};
 use crate::error::{Code, Error};
 use crate::series::{Plate, PlateKind, TagPrint, Tags};
 
@@ -55,7 +54,7 @@ pub(super) fn named(picture: &Picture, plate: &Plate, failure: &Error) -> Option
 }
 
 fn tags(picture: &Picture, code: Code) -> Option<Instead> {
-    let passes: Vec<Vec<Quad>> = passes(picture).collect();
+    let passes = coded(picture);
     if let Some(seen) = agreed(picture, &passes, usual_dictionaries()).filter(|seen| !seen.side_by_side) {
         return Some(Instead {
             what: format!("markers of {} are seen in every second square, as on a ChArUco board", seen.dictionary),
@@ -90,10 +89,14 @@ fn chessboard(picture: &Picture) -> Option<Instead> {
     let lattice = find_lattice(picture, least)?;
     let range = trimmed(&lattice)?;
     let is_board = range.iter().all(|[low, high]| high - low + 1 >= LEAST_LINES);
-    if !is_board || evenness(&Shader::of(picture, &lattice)?, range)? < SQUARES {
+    if !is_board {
         return None;
     }
-    let size = BoardSeen::of(picture, &lattice)?.size();
+    let shader = Shader::of(picture, &lattice)?;
+    if evenness(&shader, range)? < SQUARES {
+        return None;
+    }
+    let size = BoardSeen::of(&shader)?.size();
     let size = size.map_or_else(String::new, |[a, b]| format!(" of {} x {} inner corners", a.max(b), a.min(b)));
     let keys = "columns, rows (inner corners) and pitch_m";
     Some(Instead { what: format!("a chessboard{size} is seen"), kind: "chessboard", keys })

@@ -8,7 +8,7 @@ use calib_targets_aruco::Dictionary;
 use calib_targets_aruco::builtins::{
     DICT_4X4_50, DICT_5X5_50, DICT_APRILTAG_16h5, DICT_APRILTAG_25h9, DICT_APRILTAG_36h10, DICT_ARUCO_MIP_36h12,
 };
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 use robotcal::Code;
 use robotcal::detect::{Detection, Picture, detect, detect_series};
 use robotcal::series::{Aruco, Edge, Plate, PlateKind, parse_plate};
@@ -372,4 +372,71 @@ fn markers_that_begin_before_the_stated_first_are_named_by_their_numbers() {
     let plate = Plate { aruco: Some(aruco), ..charuco_plate(None) };
     let error = detect(&charuco_scene(0.1).render(0), &plate).expect_err("other numbers");
     assert_says(&error, Code::PlateNotFound, &["0 to 26", "10 to 36", "first_id"]);
+}
+
+/// With the layout stated, the markers of the first column (of the last in OpenCV's layout before 4.6) are the only ones that do not fit into the other
+/// layout, too, moved by a column: where they are seen, a line that something hides is no doubt.
+#[test]
+fn a_hidden_line_is_no_doubt_of_a_layout_that_markers_tell() {
+    let view = View::new(COLUMNS, ROWS, [321.3, 239.6], 46.0, 0.03, [0.015, -0.01]);
+    let covered = |legacy: bool, left: bool| {
+        let print = Print::Charuco { dictionary: DICT_4X4_50, ratio: 0.7, legacy };
+        let mut picture = Scene { print, ..Scene::new(COLUMNS, ROWS, view) }.render(0);
+        let is_covered = |x: usize| if left { x < 172 } else { x > 470 };
+        let all = picture.pixels.iter_mut().enumerate();
+        all.filter(|(k, _)| is_covered(k % picture.width)).for_each(|(_, value)| *value = 90.0);
+        picture
+    };
+    let plate = |legacy| Plate {
+        aruco: Some(Aruco { dictionary: "DICT_4X4_50".to_owned(), side_m: 0.007, legacy, first_id: 0 }),
+        ..charuco_plate(None)
+    };
+    for legacy in [false, true] {
+        let detection = detect(&covered(legacy, legacy), &plate(legacy)).unwrap();
+        let found = detection.observations.len();
+        assert!((34..40).contains(&found), "{legacy}: {found} {:?}", detection.dropped);
+        let error = rms(&errors(&detection, |id| Scene::new(COLUMNS, ROWS, view).corner(id)));
+        assert!(error < 0.02, "{legacy}: {error}");
+        // Of the other layout these markers may be.
+        let other = detect(&covered(!legacy, !legacy), &plate(legacy)).expect_err("the other layout");
+        assert_eq!(other.code, Code::PlateNotDetectable, "{legacy}: {other}");
+        let moved = detect(&covered(!legacy, legacy), &plate(legacy)).expect_err("it fits, moved by a column");
+        assert_eq!(moved.code, Code::PlateLineHidden, "{legacy}: {moved}");
+    }
+}
+
+/// From 20 degrees above its plane, and less: no line of squares is found, or few.
+#[test]
+fn a_board_seen_slantwise_is_found_by_its_markers() {
+    let size = (1280, 960);
+    let (mut in_view, mut found) = (0, 0);
+    for (azimuth, roll, tilt) in [(0.3, 0.4, 70.0), (1.9, -0.2, 72.0), (3.6, 0.5, 74.0), (5.0, 0.1, 70.0)] {
+        let view = slantwise(f64::to_radians(tilt), azimuth, roll, size);
+        let scene = Scene { size, view, noise: 2.5, ..charuco_scene(0.0) };
+        let detection = detect(&scene.render(7), &charuco_plate(Some(("DICT_4X4_50", 0.7)))).unwrap();
+        let is_in_view = |[x, y]: &[f64; 2]| (12.0..1268.0).contains(x) && (12.0..948.0).contains(y);
+        in_view += (0..COLUMNS * ROWS).filter(|id| is_in_view(&scene.corner(*id))).count();
+        found += detection.observations.len();
+        let errors = errors(&detection, |id| scene.corner(id));
+        assert!(errors.iter().all(|[u, v]| u.hypot(*v) < 2.0), "{azimuth}");
+    }
+    assert!(20 * found >= 19 * in_view, "{found} of {in_view}");
+}
+
+/// The board turned in its plane, then tilted away about an axis in the picture, ten squares before a camera.
+fn slantwise(tilt: f64, azimuth: f64, roll: f64, size: (usize, usize)) -> View {
+    let axis = Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt;
+    let turned = Rotation3::new(axis) * Rotation3::new(Vector3::z() * roll);
+    let [x, y] = [0, 1].map(|k| turned * Vector3::ith(k, 1.0));
+    let middle = [COLUMNS, ROWS].map(|n| f64::from(n - 1) / 2.0);
+    let origin = Vector3::z() * 10.0 - x * middle[0] - y * middle[1];
+    let pixel = |k: usize| {
+        let row = |v: &Vector3<f64>| match k {
+            0 => 1300.0 * v.x + 0.5 * size.0 as f64 * v.z,
+            1 => 1300.0 * v.y + 0.5 * size.1 as f64 * v.z,
+            _ => v.z,
+        };
+        [row(&x), row(&y), row(&origin)]
+    };
+    View([pixel(0), pixel(1), pixel(2)])
 }

@@ -138,6 +138,19 @@ fn blurred_and_tilted_tags_are_as_uncertain_as_stated() {
     assert!(tally.found > 300 && tally.normalised < 1.5, "{tally:?}");
 }
 
+/// Corners of tags that are seen slantwise are as sharp as 20 degrees: near them the next side lies in the ink beside a side.
+#[test]
+fn tags_seen_slantwise_are_as_uncertain_as_stated() {
+    let tally = run_views(ARUCO, 0.72, |rng| View {
+        distance_m: rng.random_range(0.3..0.4),
+        tilt_deg: rng.random_range(64.0..72.0),
+        aim_m: [0.0; 2],
+        ..view(rng)
+    });
+    assert_eq!(tally.wrong, 0);
+    assert!(tally.found as f64 >= 0.85 * tally.visible as f64 && tally.normalised < 1.5, "{tally:?}");
+}
+
 /// Paper that is clipped makes the tags smaller and the squares between them, too: where they meet, nothing moves.
 #[test]
 fn clipped_paper_moves_no_corner_of_an_aprilgrid() {

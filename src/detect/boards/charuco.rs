@@ -9,9 +9,10 @@ use std::cell::LazyCell;
 use calib_targets_chessboard::ChessCorner;
 
 use super::charuco_markers::{Marker, Print, decode, prints, rare_prints};
-use super::charuco_numbers::{Contradiction, Counting, contradiction};
+use super::charuco_numbers::{Contradiction, Counting, Numbers};
 use super::charuco_placed::placed;
 use super::charuco_seen::{MarkersSeen, elsewhere, ids, instead, side_seen};
+use super::charuco_tagged::tagged;
 use super::chessboard::{WINDOW, board_size};
 use super::corner_finder::find_corners;
 use super::lattices::{Sorted, on_no_larger};
@@ -21,7 +22,8 @@ use crate::detect::corners::{Window, measure};
 use crate::detect::pictures::bytes::Bytes;
 use crate::detect::shared::{KEEP_OFF_PX, mirrored};
 use crate::detect::size_seen::twin;
-use crate::detect::tags::scan::all_dictionaries;
+use crate::detect::tags::quads::Quad;
+use crate::detect::tags::scan::{all_dictionaries, coded};
 use crate::detect::{Detection, Outline, Picture};
 use crate::error::{Code, Error, Notice, Result};
 use crate::geom::PlaneMap;
@@ -62,18 +64,25 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
         None if !rare.is_empty() => best(&rare)?,
         found => found,
     };
-    let Some(found) = found else {
-        let mut other = bytes.clone();
-        other.mirror();
-        if at_scale(&Scaled::of(&other, 1.0), Sought { prints: &prints, board, least, cells_of: None })?.is_some() {
-            return Err(mirrored("the board is mirrored"));
+    let quads = LazyCell::new(|| coded(picture));
+    let found = match found {
+        Some(found) => found,
+        None => {
+            let mut other = bytes.clone();
+            other.mirror();
+            if at_scale(&Scaled::of(&other, 1.0), Sought { prints: &prints, board, least, cells_of: None })?.is_some() {
+                return Err(mirrored("the board is mirrored"));
+            }
+            on_markers(picture, plate, (&prints, board), &quads)?
         }
-        return Err(elsewhere(picture, plate).map_or_else(|| no_board(plate), |seen| other_board(plate, &seen)));
     };
-    if let Some(refusal) = numbers_contradict(picture, plate, board, &found) {
+    let numbers = Numbers::read(picture, &found.lattice, &found.print, board);
+    if let Some(contradiction) = numbers.contradiction(found.markers)
+        && let Some(refusal) = numbers_contradict(plate, contradiction, || instead(picture, plate, &quads))
+    {
         return refusal;
     }
-    let is_sure = found.is_sure(board);
+    let is_sure = found.is_sure(board) || found.has_place && numbers.tell_layout();
     if plate.aruco.is_some() && prints.first().is_some_and(|stated| stated.legacy != found.print.legacy) {
         let error = other_layout(found.print.legacy);
         return if found.tells_layout() { Ok(Detection::other_size(error)) } else { Err(error) };
@@ -91,28 +100,34 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
         detection.outline = Outline::TagsMissing;
     }
     if detection.observations.is_empty()
-        && let Some(seen) = instead(picture, plate)
+        && let Some(seen) = instead(picture, plate, &quads)
     {
         return Err(other_board(plate, &seen));
     }
     if plate.aruco.is_none() {
-        detection.notices.push(found_print(&print, side_seen(picture, &print)));
+        detection.notices.push(found_print(&print, side_seen(picture, &print, &quads)));
     }
     detection.notices.extend(has_twin.then(twin));
     Ok(detection)
 }
 
 /// The refusal of a board whose markers, all that are in view, are not those that the plate file has at their places.
-fn numbers_contradict(picture: &Picture, plate: &Plate, board: BoardSize, found: &Found) -> Option<Result<Detection>> {
+fn numbers_contradict(
+    plate: &Plate,
+    contradiction: Contradiction,
+    instead: impl Fn() -> Option<MarkersSeen>,
+) -> Option<Result<Detection>> {
     let stated = plate.aruco.as_ref().map_or(0, |aruco| aruco.first_id);
-    match contradiction(picture, &found.lattice, (&found.print, found.markers), board)? {
+    match contradiction {
         Contradiction::Counts(Counting { first_id, legacy }) if first_id == stated => {
             let is_other = plate.aruco.as_ref().is_some_and(|aruco| aruco.legacy != legacy);
             is_other.then(|| Ok(Detection::other_size(other_layout(legacy))))
         }
         Contradiction::Counts(counting) => Some(Ok(Detection::other_size(other_first(plate, counting)))),
-        Contradiction::Outnumbers { wrong, right } => Some(Err(instead(picture, plate)
-            .map_or_else(|| other_numbers(plate, [wrong, right]), |seen| other_board(plate, &seen)))),
+        Contradiction::Outnumbers { wrong, right } => {
+            let named = |seen| other_board(plate, &seen);
+            Some(Err(instead().map_or_else(|| other_numbers(plate, [wrong, right]), named)))
+        }
     }
 }
 
@@ -148,6 +163,22 @@ impl Found {
     /// Markers that were read, then corners that are on the board: in the other layout most markers agree, moved by a column.
     fn explains(&self) -> (usize, usize) {
         (self.markers, self.lattice.len())
+    }
+
+    /// Where both have the same corners, those of both; else what explains more, of equals the other.
+    fn beside(self, other: Self) -> Self {
+        let common = |(at, uv): (_, &[f64; 2])| self.lattice.get(at).map(|own| own == uv);
+        let mut common = other.lattice.iter().filter_map(common).peekable();
+        let is_same = self.print.legacy == other.print.legacy && common.peek().is_some() && common.all(|same| same);
+        let (mut best, rest) = if other.explains() >= self.explains() { (other, self) } else { (self, other) };
+        let before = best.lattice.len();
+        for (at, uv) in rest.lattice.into_iter().filter(|_| is_same) {
+            best.lattice.entry(at).or_insert(uv);
+        }
+        // They may be on a board of the other layout as well.
+        let added = best.lattice.len() - before;
+        best.rival = best.rival.map(|(markers, corners)| (markers, corners + added));
+        best
     }
 
     /// Whether the markers alone say which corner is which. On a board with an odd number of squares in a row they fit into both layouts,
@@ -211,8 +242,7 @@ fn at_scale(scaled: &Scaled, sought: Sought) -> Result<Option<Found>> {
         }
         let Sorted { lattices, left } = Sorted::of(&corners, *scale);
         let on_lattice = sought.on_lattices(&lattices);
-        // Of equals that which the library found.
-        if let Some(found) = [on_lattice, found].into_iter().flatten().max_by_key(Found::explains) {
+        if let Some(found) = [on_lattice, found].into_iter().flatten().reduce(Found::beside) {
             return Ok(Some(found));
         }
         if lattices.is_empty() {
@@ -289,6 +319,33 @@ fn beside(corners: &[ChessCorner], lattice: &Lattice, scale: f64, board: BoardSi
         map.apply(place).is_none_or(|at| (0..2).any(|a| at[a] < -MARGIN || at[a] > size[a] - 1.0 + MARGIN))
     };
     corners.iter().filter(is_beside).copied().collect()
+}
+
+/// The stated board, where no marker says otherwise, by the contours of those that are in its squares.
+fn on_markers(
+    picture: &Picture,
+    plate: &Plate,
+    (prints, board): (&[Print], BoardSize),
+    quads: &[Vec<Quad>],
+) -> Result<Found> {
+    if let Some(seen) = elsewhere(picture, plate, quads) {
+        return Err(other_board(plate, &seen));
+    }
+    let stated = prints.iter().filter(|_| plate.aruco.is_some());
+    let on_board = |print: &Print| {
+        let (markers, lattice) = tagged(picture, quads, print, board)?;
+        // Markers of the last row are read whether or not there is one below it.
+        let found = Found { has_further_row: false, ..Found::of(print, &markers, lattice, board) };
+        found.has_place.then_some(found)
+    };
+    let all: Vec<Found> = stated.filter_map(on_board).collect();
+    // Corners are where markers have them, and tell nothing of the layout.
+    let (own, others): (Vec<Found>, Vec<Found>) =
+        all.into_iter().partition(|found| prints.first().is_some_and(|stated| stated.legacy == found.print.legacy));
+    let rival = others.iter().map(|found| found.markers).max();
+    let own = own.into_iter().max_by_key(|found| found.markers).filter(|own| Some(own.markers) >= rival);
+    own.map(|own| Found { rival: rival.map(|markers| (markers, own.lattice.len())), ..own })
+        .ok_or_else(|| no_board(plate))
 }
 
 /// Whether markers of the last row of squares are read: that takes the corners below them, and at the end of a board there are none.
@@ -424,4 +481,29 @@ fn either_layout() -> Error {
         "the markers in view fit into both of OpenCV's layouts, a column apart: which corner is which cannot be told";
     let remedy = "write dictionary, side_m and legacy (true for the layout before 4.6) under [aruco] in the plate file";
     Error::new(Code::PlateIncomplete, "image", what, remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use calib_targets_aruco::builtins::DICT_4X4_50;
+
+    use super::*;
+
+    /// The library may read one marker less and find more corners.
+    #[test]
+    fn of_two_finds_with_the_same_corners_both_count() {
+        let board = BoardSize { columns: 8, rows: 5 };
+        let print = Print { dictionary: DICT_4X4_50, ratio: 0.7, legacy: false, first_id: 0 };
+        let found = |markers: i32, columns: i32, step: f64| {
+            let markers: Vec<Marker> = (0..markers).map(|k| Marker { row: k % 4, wrong_bits: 0 }).collect();
+            let corners = (0..columns).flat_map(|u| (0..5).map(move |v| (u, v)));
+            let lattice = corners.map(|at| (at, [at.0, at.1].map(|n| step * f64::from(n)))).collect();
+            Found::of(&print, &markers, lattice, board)
+        };
+        let both = found(13, 6, 20.0).beside(found(12, 8, 20.0));
+        assert_eq!(both.explains(), (13, 40));
+        let elsewhere = found(13, 6, 20.0).beside(found(12, 8, 21.0));
+        assert_eq!(elsewhere.explains(), (13, 30));
+        assert_eq!(found(12, 8, 20.0).beside(found(12, 8, 21.0)).lattice[&(1, 1)], [21.0; 2]);
+    }
 }

@@ -6,7 +6,6 @@ use crate::detect::Picture;
 use crate::detect::corners::lattice::Lattice;
 use crate::detect::tags::code::Reader;
 use crate::geom::PlaneMap;
-use crate::series::{TagPrint, Tags};
 
 /// Reads the markers of a print in the cells of a lattice.
 pub(super) struct Cells<'a> {
@@ -29,20 +28,12 @@ pub(super) struct CellReading {
 
 impl<'a> Cells<'a> {
     pub fn of(picture: &'a Picture, lattice: &'a Lattice, print: &Print) -> Option<Self> {
-        let dictionary = print.dictionary;
-        let tags = Tags {
-            dictionary: dictionary.name().to_owned(),
-            print: TagPrint::Opencv,
-            side_m: 1.0,
-            gap_m: 0.0,
-            first_id: 0,
-        };
         let ends = [0.5 * (1.0 - print.ratio), 0.5 * (1.0 + print.ratio)];
         Some(Self {
             picture,
             lattice,
             shader: Shader::of(picture, lattice)?,
-            reader: Reader::of(&tags, &dictionary),
+            reader: Reader::of_opencv(&print.dictionary),
             ends,
         })
     }

@@ -42,28 +42,75 @@ pub(super) enum Contradiction {
     Outnumbers { wrong: usize, right: usize },
 }
 
-/// What contradicts the numbers of a board that was found as this print by so many markers; `None` where nothing does.
-pub(super) fn contradiction(
-    picture: &Picture,
-    lattice: &Lattice,
-    (print, markers): (&Print, usize),
+/// The markers that are read in the squares of a board, and just beyond.
+pub(super) struct Numbers {
+    read: Vec<(Square, u32)>,
     board: BoardSize,
-) -> Option<Contradiction> {
-    let read = read(picture, lattice, print, board);
-    let stated = Counting::of(print);
-    let agrees = |(square, id): &&(Square, u32)| number(board, stated, *square) == Some(*id);
-    let right = read.iter().filter(agrees).count();
-    let wrong = read.len() - right;
-    // The library may read more in blur and noise.
-    let right = right.max(markers);
-    if wrong < LEAST {
-        return None;
+    stated: Counting,
+}
+
+impl Numbers {
+    /// Of a board that was found as this print.
+    pub fn read(picture: &Picture, lattice: &Lattice, print: &Print, board: BoardSize) -> Self {
+        Self { read: read(picture, lattice, print, board), board, stated: Counting::of(print) }
     }
-    let (best, votes) = most_agree(&read, board, stated)?;
-    if best != stated && votes >= right + LEAST && 2 * votes > read.len() {
-        return Some(Contradiction::Counts(best));
+
+    /// What contradicts the board that was found by so many markers; `None` where nothing does.
+    pub fn contradiction(&self, markers: usize) -> Option<Contradiction> {
+        let right = self.right();
+        let wrong = self.read.len() - right;
+        // The library may read more in blur and noise.
+        let right = right.max(markers);
+        if wrong < LEAST {
+            return None;
+        }
+        let (best, votes) = self.most_agree()?;
+        if best != self.stated && votes >= right + LEAST && 2 * votes > self.read.len() {
+            return Some(Contradiction::Counts(best));
+        }
+        (wrong > right).then_some(Contradiction::Outnumbers { wrong, right })
     }
-    (wrong > right).then_some(Contradiction::Outnumbers { wrong, right })
+
+    /// Whether more markers agree with the layout than with the other one, wherever the board lies then.
+    pub fn tell_layout(&self) -> bool {
+        let other = Counting { legacy: !self.stated.legacy, ..self.stated };
+        let squares: BTreeMap<u32, Square> = numbered(self.board, other).collect();
+        let mut moved: BTreeMap<Square, usize> = BTreeMap::new();
+        for ((column, row), id) in &self.read {
+            if let Some((to_column, to_row)) = squares.get(id) {
+                *moved.entry((to_column - column, to_row - row)).or_default() += 1;
+            }
+        }
+        moved.into_values().max().unwrap_or(0) < self.right()
+    }
+
+    fn right(&self) -> usize {
+        let agrees = |(square, id): &&(Square, u32)| number(self.board, self.stated, *square) == Some(*id);
+        self.read.iter().filter(agrees).count()
+    }
+
+    /// The counting with which most markers agree, wherever the board lies then, with their number; of equals the one that differs least.
+    fn most_agree(&self) -> Option<(Counting, usize)> {
+        let Self { read, board, stated } = self;
+        // With an odd number of rows of squares there is one layout.
+        let layouts = [stated.legacy, !stated.legacy].into_iter().take(if board.rows % 2 == 1 { 2 } else { 1 });
+        let mut votes: BTreeMap<(Square, Counting), usize> = BTreeMap::new();
+        for legacy in layouts {
+            for down in -board.rows..=board.rows {
+                for right in -board.columns..=board.columns {
+                    let first = |((column, row), id): &(Square, u32)| {
+                        id.checked_sub(before(*board, legacy, (column + right, row + down))?)
+                    };
+                    for first_id in read.iter().filter_map(first) {
+                        *votes.entry(((right, down), Counting { first_id, legacy })).or_default() += 1;
+                    }
+                }
+            }
+        }
+        let alike = |c: &Counting| (c.first_id == stated.first_id, c.legacy == stated.legacy);
+        let best = votes.into_iter().max_by_key(|((_, counting), count)| (*count, alike(counting)))?;
+        Some((best.0.1, best.1))
+    }
 }
 
 /// The upright markers in the light squares of the lattice.
@@ -88,6 +135,12 @@ pub(super) fn number(board: BoardSize, counting: Counting, square: Square) -> Op
     counting.first_id.checked_add(before(board, counting.legacy, square)?)
 }
 
+/// The markers of a board with their squares.
+pub(super) fn numbered(board: BoardSize, counting: Counting) -> impl Iterator<Item = (u32, Square)> {
+    let squares = (0..=board.rows).flat_map(move |row| (0..=board.columns).map(move |column| (column, row)));
+    squares.filter_map(move |square| Some((number(board, counting, square)?, square)))
+}
+
 /// Markers before that in a square; `None` where there is none.
 fn before(board: BoardSize, legacy: bool, (column, row): Square) -> Option<u32> {
     let width = board.columns + 1;
@@ -98,26 +151,4 @@ fn before(board: BoardSize, legacy: bool, (column, row): Square) -> Option<u32> 
     // Light squares among the first ones of a row.
     let light = |row: i32, columns: i32| (columns + i32::from(is_light((0, row), legacy))) / 2;
     u32::try_from((0..row).map(|row| light(row, width)).sum::<i32>() + light(row, column)).ok()
-}
-
-/// The counting with which most markers agree, wherever the board lies then, with their number; of equals the one that differs least.
-fn most_agree(read: &[(Square, u32)], board: BoardSize, stated: Counting) -> Option<(Counting, usize)> {
-    // With an odd number of rows of squares there is one layout.
-    let layouts = [stated.legacy, !stated.legacy].into_iter().take(if board.rows % 2 == 1 { 2 } else { 1 });
-    let mut votes: BTreeMap<(Square, Counting), usize> = BTreeMap::new();
-    for legacy in layouts {
-        for down in -board.rows..=board.rows {
-            for right in -board.columns..=board.columns {
-                let first = |((column, row), id): &(Square, u32)| {
-                    id.checked_sub(before(board, legacy, (column + right, row + down))?)
-                };
-                for first_id in read.iter().filter_map(first) {
-                    *votes.entry(((right, down), Counting { first_id, legacy })).or_default() += 1;
-                }
-            }
-        }
-    }
-    let alike = |c: &Counting| (c.first_id == stated.first_id, c.legacy == stated.legacy);
-    let best = votes.into_iter().max_by_key(|((_, counting), count)| (*count, alike(counting)))?;
-    Some((best.0.1, best.1))
 }

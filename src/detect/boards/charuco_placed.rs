@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use super::charuco_cells::Cells;
 use super::charuco_markers::{Marker, Print};
-use super::charuco_numbers::{Counting, Square, number};
+use super::charuco_numbers::{Counting, Square, numbered};
 use crate::detect::Picture;
 use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
 
@@ -22,7 +22,7 @@ pub(super) fn placed(
     board: BoardSize,
 ) -> Option<(Placement, Vec<Marker>)> {
     let cells = Cells::of(picture, lattice, print)?;
-    let squares: BTreeMap<u32, Square> = numbered(print, board).collect();
+    let squares: BTreeMap<u32, Square> = numbered(board, Counting::of(print)).collect();
     let mut votes: BTreeMap<(u8, (i32, i32)), Vec<Marker>> = BTreeMap::new();
     // A row of markers that ends in view has no corners below it.
     let is_whole =
@@ -38,13 +38,6 @@ pub(super) fn placed(
     let ((turns, origin), markers) = votes.into_iter().max_by_key(|(_, markers)| markers.len())?;
     let placement = Placement { board, turns, light_first: print.legacy, origin };
     (all - markers.len() <= markers.len() / AGREEING).then_some((placement, markers))
-}
-
-/// The markers of a board with their squares.
-fn numbered(print: &Print, board: BoardSize) -> impl Iterator<Item = (u32, Square)> {
-    let squares = (0..=board.rows).flat_map(move |row| (0..=board.columns).map(move |column| (column, row)));
-    let counting = Counting::of(print);
-    squares.filter_map(move |square| Some((number(board, counting, square)?, square)))
 }
 
 /// Least lattice coordinates of the corners of a board that has a square in this cell; its corners are counted from the first inner one.

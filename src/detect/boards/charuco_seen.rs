@@ -9,8 +9,8 @@ use crate::detect::Picture;
 use crate::detect::tags::code::Reader;
 use crate::detect::tags::layout::Layout;
 use crate::detect::tags::quads::Quad;
-use crate::detect::tags::scan::{corners, passes, scan, usual_dictionaries};
-use crate::series::{Plate, TagPrint, Tags, dictionary_named};
+use crate::detect::tags::scan::{corners, scan, usual_dictionaries};
+use crate::series::{Plate, dictionary_named};
 
 /// Pairs of markers two squares apart that must agree on the numbers.
 const LEAST_PAIRS: usize = 4;
@@ -36,9 +36,7 @@ pub struct MarkersSeen {
 
 impl MarkersSeen {
     fn of(picture: &Picture, passes: &[Vec<Quad>], dictionary: Dictionary) -> Self {
-        let print = TagPrint::Opencv;
-        let tags = Tags { dictionary: dictionary.name().to_owned(), print, side_m: 1.0, gap_m: 0.0, first_id: 0 };
-        let layout = Layout::of(&corners(&scan(picture, &Reader::of(&tags, &dictionary), passes, false)));
+        let layout = Layout::of(&corners(&scan(picture, &Reader::of_opencv(&dictionary), passes, false)));
         let (across, down) = (layout.agreed((2, 0)), layout.agreed((0, -2)));
         let pairs = [across, down].into_iter().flatten().map(|(_, count)| count).sum();
         let columns = down.and_then(|(squares, _)| u32::try_from(squares - 1).ok());
@@ -90,25 +88,23 @@ fn stated(plate: &Plate) -> Option<Dictionary> {
 }
 
 /// The board that most markers agree with, where it is another one.
-pub fn instead(picture: &Picture, plate: &Plate) -> Option<MarkersSeen> {
-    seen(picture, plate).filter(|best| !best.is(plate))
+pub fn instead(picture: &Picture, plate: &Plate, passes: &[Vec<Quad>]) -> Option<MarkersSeen> {
+    seen(picture, plate, passes).filter(|best| !best.is(plate))
 }
 
 /// The same, or the stated board with some numbers that it has not.
-pub fn elsewhere(picture: &Picture, plate: &Plate) -> Option<MarkersSeen> {
+pub fn elsewhere(picture: &Picture, plate: &Plate, passes: &[Vec<Quad>]) -> Option<MarkersSeen> {
     let has_others = |seen: &MarkersSeen| seen.ids.iter().any(|id| !ids(plate).contains(id));
-    seen(picture, plate).filter(|best| !best.is(plate) || has_others(best))
+    seen(picture, plate, passes).filter(|best| !best.is(plate) || has_others(best))
 }
 
-fn seen(picture: &Picture, plate: &Plate) -> Option<MarkersSeen> {
-    let passes: Vec<Vec<Quad>> = passes(picture).collect();
-    agreed(picture, &passes, stated(plate).into_iter().chain(usual_dictionaries()))
+fn seen(picture: &Picture, plate: &Plate, passes: &[Vec<Quad>]) -> Option<MarkersSeen> {
+    agreed(picture, passes, stated(plate).into_iter().chain(usual_dictionaries()))
 }
 
 /// Side of the markers over that of a square, as their contours tell it, or else as they are read.
-pub fn side_seen(picture: &Picture, print: &Print) -> f64 {
-    let passes: Vec<Vec<Quad>> = passes(picture).collect();
-    MarkersSeen::of(picture, &passes, print.dictionary).side.unwrap_or(print.ratio)
+pub fn side_seen(picture: &Picture, print: &Print, passes: &[Vec<Quad>]) -> f64 {
+    MarkersSeen::of(picture, passes, print.dictionary).side.unwrap_or(print.ratio)
 }
 
 /// The board that most markers agree with, of these dictionaries.

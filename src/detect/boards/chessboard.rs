@@ -3,10 +3,10 @@
 //! The lattice of corners comes from the `calib-targets` library; which corner is which, the sub-pixel position in the
 //! full depth of the picture and its covariance are found here.
 
-use std::cell::LazyCell;
+use std::cell::OnceCell;
 
 use super::ends::Ends;
-use super::labels::{Labelling, label};
+use super::labels::{Labelling, Shader, label};
 use super::lattices::Lattices;
 use super::seen::BoardSeen;
 use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
@@ -32,7 +32,7 @@ pub(super) const WINDOW: Window = Window { reach: 0.4, radius_px: 16.0, arm: 1.0
 pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
     let board = board_size(plate)?;
     let seen = Lattices::of(picture);
-    let largest = on_lattice(picture, seen.largest(board).ok_or_else(no_board)?, board);
+    let largest = on_lattice(&Looked::at(picture, seen.largest(board).ok_or_else(no_board)?), board);
     match &largest {
         Ok(detection) if detection.failure.is_none() => largest,
         _ => beside(picture, &seen, board).map_or(largest, Ok),
@@ -42,20 +42,55 @@ pub fn detect(picture: &Picture, plate: &Plate) -> Result<Detection> {
 /// The stated board from end to end beside a larger one, or before a floor of tiles.
 fn beside(picture: &Picture, seen: &Lattices, board: BoardSize) -> Option<Detection> {
     seen.smaller().find_map(|lattice| {
-        BoardSeen::of(picture, &lattice).filter(|seen| seen.is(board))?;
-        let found = on_lattice(picture, &lattice, board).ok()?;
+        let looked = Looked::at(picture, &lattice);
+        looked.seen().filter(|seen| seen.is(board))?;
+        let found = on_lattice(&looked, board).ok()?;
         let is_whole = found.failure.is_none() && found.outline == Outline::Whole;
         is_whole.then_some(Detection { outline: Outline::Beside, ..found })
     })
 }
 
-fn on_lattice(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Result<Detection> {
-    let ends = LazyCell::new(|| Ends::of(picture, lattice));
+/// A lattice with what is seen of it, looked for once, when it is asked for.
+struct Looked<'a> {
+    picture: &'a Picture,
+    lattice: &'a Lattice,
+    shader: OnceCell<Option<Shader<'a>>>,
+    ends: OnceCell<Option<Ends>>,
+    seen: OnceCell<Option<BoardSeen>>,
+}
+
+impl<'a> Looked<'a> {
+    fn at(picture: &'a Picture, lattice: &'a Lattice) -> Self {
+        Self { picture, lattice, shader: OnceCell::new(), ends: OnceCell::new(), seen: OnceCell::new() }
+    }
+
+    fn shader(&self) -> Option<&Shader<'a>> {
+        self.shader.get_or_init(|| Shader::of(self.picture, self.lattice)).as_ref()
+    }
+
+    fn ends(&self) -> Option<Ends> {
+        *self.ends.get_or_init(|| Ends::of(self.shader()?))
+    }
+
+    fn seen(&self) -> Option<BoardSeen> {
+        *self.seen.get_or_init(|| BoardSeen::of(self.shader()?))
+    }
+
+    /// Where the board lies by its colours.
+    fn labelling(&self, board: BoardSize) -> Labelling {
+        // Of a larger lattice no placement covers half.
+        let may_be = self.lattice.len() <= 2 * (board.columns * board.rows) as usize;
+        let shader = may_be.then(|| self.shader()).flatten();
+        shader.map_or(Labelling::Contradiction, |shader| label(shader, board))
+    }
+}
+
+fn on_lattice(looked: &Looked, board: BoardSize) -> Result<Detection> {
     let placed = |labelling: Labelling| Some((labelling, labelling.placement()?));
-    let by_ends = || placed(ends.as_ref()?.place(board)?);
-    let measured = |placement: Placement| measure(picture, lattice, placement, WINDOW);
-    let by_colours = label(picture, lattice, board);
-    let exceeded = |placement: Placement| ends.is_some_and(|ends| ends.exceed(placement));
+    let by_ends = || placed(looked.ends()?.place(board)?);
+    let measured = |placement: Placement| measure(looked.picture, looked.lattice, placement, WINDOW);
+    let by_colours = looked.labelling(board);
+    let exceeded = |placement: Placement| looked.ends().is_some_and(|ends| ends.exceed(placement));
     let of_colours = placed(by_colours);
     let Some((mut labelling, placement)) = of_colours.filter(|(_, p)| !exceeded(*p)).or_else(by_ends) else {
         let why = match by_colours {
@@ -63,16 +98,17 @@ fn on_lattice(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Result<
             Labelling::Ambiguous => ambiguous(),
             _ => contradiction(board),
         };
-        return refusal(picture, lattice, board, why);
+        return refusal(looked, board, why);
     };
     let mut detection = measured(placement);
     // Light that hides a line looks like the end of the board: what is taken for hidden may as well be what is taken for paper.
-    if detection.outline == Outline::LineMissing && ends.is_none_or(|ends| !ends.leave_only(board, placement)) {
-        let Some((other, placement)) = by_ends() else { return refusal(picture, lattice, board, ambiguous()) };
+    if detection.outline == Outline::LineMissing && looked.ends().is_none_or(|ends| !ends.leave_only(board, placement))
+    {
+        let Some((other, placement)) = by_ends() else { return refusal(looked, board, ambiguous()) };
         (labelling, detection) = (other, measured(placement));
     }
     // Lines that are all there may be the first ones of more, where the border of the picture cuts the squares beyond them.
-    if detection.outline == Outline::Whole && BoardSeen::of(picture, lattice).is_none_or(|seen| !seen.is(board)) {
+    if detection.outline == Outline::Whole && looked.seen().is_none_or(|seen| !seen.is(board)) {
         detection.outline = Outline::Lines;
     }
     let mut notices = Vec::new();
@@ -80,7 +116,7 @@ fn on_lattice(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Result<
         notices.push(symmetric_notice(board));
     }
     if detection.outline == Outline::LineMissing {
-        detection.size_seen = BoardSeen::of(picture, lattice).and_then(|seen| seen.size());
+        detection.size_seen = looked.seen().and_then(|seen| seen.size());
         notices.push(hidden_line(board));
     }
     detection.notices = notices;
@@ -88,9 +124,8 @@ fn on_lattice(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Result<
 }
 
 /// A board of another size is named as that, whatever else there is to say.
-fn refusal(picture: &Picture, lattice: &Lattice, board: BoardSize, otherwise: Error) -> Result<Detection> {
-    let seen = BoardSeen::of(picture, lattice);
-    match seen.and_then(|seen| Some((seen.lines(), seen.contradiction(board)?))) {
+fn refusal(looked: &Looked, board: BoardSize, otherwise: Error) -> Result<Detection> {
+    match looked.seen().and_then(|seen| Some((seen.lines(), seen.contradiction(board)?))) {
         Some((other_lines, error)) => Ok(Detection { other_lines, ..Detection::other_size(error) }),
         None => Err(otherwise),
     }

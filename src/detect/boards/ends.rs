@@ -5,8 +5,7 @@
 
 use super::labels::{Labelling, Shader, parity};
 use super::seen::{Beyond, Range, SQUARES, even_cells, followed, trimmed};
-use crate::detect::Picture;
-use crate::detect::corners::lattice::{BoardSize, Lattice, Placement};
+use crate::detect::corners::lattice::{BoardSize, Placement};
 
 /// How far from the end of the squares they are looked at, px ...
 const BESIDE_PX: f64 = 2.5;
@@ -37,12 +36,11 @@ pub struct Ends {
 
 impl Ends {
     /// `None` where the lattice does not have the colours of a board.
-    pub fn of(picture: &Picture, lattice: &Lattice) -> Option<Self> {
-        let shader = Shader::of(picture, lattice)?;
-        let range = trimmed(lattice)?;
-        let even = even_cells(&shader, range).filter(|mean| mean.abs() >= SQUARES)?;
+    pub fn of(shader: &Shader) -> Option<Self> {
+        let range = trimmed(shader.lattice())?;
+        let even = even_cells(shader, range).filter(|mean| mean.abs() >= SQUARES)?;
         let even_light = even > 0.0;
-        let (range, sharp) = followed(range, |range, axis, end| side(&shader, even_light, range, axis, end));
+        let (range, sharp) = followed(range, |range, axis, end| side(shader, even_light, range, axis, end));
         Some(Self { range, sharp, even_light })
     }
 

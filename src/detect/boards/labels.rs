@@ -67,18 +67,11 @@ struct Scored {
 }
 
 /// Finds where the lattice lies on the board from the colours of the squares.
-pub(super) fn label(picture: &Picture, lattice: &Lattice, board: BoardSize) -> Labelling {
-    // No placement covers half of it.
-    if lattice.len() > 2 * (board.columns * board.rows) as usize {
-        return Labelling::Contradiction;
-    }
+pub(super) fn label(shader: &Shader, board: BoardSize) -> Labelling {
     let reach = board.columns.max(board.rows) + 1;
-    let shades = Shader::of(picture, lattice).and_then(|shader| {
-        let mut shades = Shades::read(&shader, reach)?;
-        shades.forget_covered(&shader);
-        Some(shades)
-    });
-    shades.map_or(Labelling::Contradiction, |shades| choose(lattice, &shades, board))
+    let Some(mut shades) = Shades::read(shader, reach) else { return Labelling::Contradiction };
+    shades.forget_covered(shader);
+    choose(shader.lattice(), &shades, board)
 }
 
 fn choose(lattice: &Lattice, shades: &Shades, board: BoardSize) -> Labelling {
@@ -204,6 +197,10 @@ pub struct Shader<'a> {
 impl<'a> Shader<'a> {
     pub fn of(picture: &'a Picture, lattice: &'a Lattice) -> Option<Self> {
         Some(Self { picture, maps: Maps::of(lattice)?, inner: inner_cells(picture, lattice) })
+    }
+
+    pub fn lattice(&self) -> &'a Lattice {
+        self.maps.lattice
     }
 
     /// At a place within a cell, whose corners are 0 and 1; `None` out of view.

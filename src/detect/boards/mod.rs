@@ -3,7 +3,8 @@
 //! ```text
 //! picture -> corner_finder (about where corners are; sizes: at which size of the picture) -> lattices (which are neighbours)
 //!         -> labels (which corner of the board each is)
-//!         -> chessboard, or charuco with charuco_markers and charuco_placed, or puzzleboard (one file a kind; corners are measured in `corners`)
+//!         -> chessboard, or charuco with charuco_markers, charuco_placed and charuco_tagged, or puzzleboard (one file a kind; corners are measured in
+//!            `corners`)
 //!         -> ends, seen, charuco_numbers, charuco_seen (is it the board of the plate file, and all of it that is in view)
 //! ```
 
@@ -13,6 +14,7 @@ mod charuco_markers;
 mod charuco_numbers;
 mod charuco_placed;
 pub(super) mod charuco_seen;
+mod charuco_tagged;
 pub mod chessboard;
 mod corner_finder;
 mod ends;

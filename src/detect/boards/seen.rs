@@ -3,7 +3,6 @@
 //! The squares go on as long as the cells of a further line alternate in their two colours, and end in view where they do not.
 
 use super::labels::{Line, Shader, bounds, parity};
-use crate::detect::Picture;
 use crate::detect::corners::lattice::{BoardSize, Lattice};
 use crate::detect::size_seen::{Counted, end_to_end, other_size};
 use crate::error::Error;
@@ -38,11 +37,10 @@ pub struct BoardSeen {
 
 impl BoardSeen {
     /// `None` where the lattice does not have the colours of a board.
-    pub fn of(picture: &Picture, lattice: &Lattice) -> Option<Self> {
-        let shader = Shader::of(picture, lattice)?;
-        let range = trimmed(lattice)?;
-        let even = even_cells(&shader, range).filter(|mean| mean.abs() >= SQUARES)?.signum();
-        let (range, ends) = followed(range, |range, axis, end| beyond(&shader, even, range, axis, end));
+    pub fn of(shader: &Shader) -> Option<Self> {
+        let range = trimmed(shader.lattice())?;
+        let even = even_cells(shader, range).filter(|mean| mean.abs() >= SQUARES)?.signum();
+        let (range, ends) = followed(range, |range, axis, end| beyond(shader, even, range, axis, end));
         Some(Self { range, ends })
     }
 

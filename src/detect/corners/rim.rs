@@ -1,7 +1,8 @@
 //! Corners at the rim of what is found that are out of line with those further inside.
 //!
 //! The edge of a hand across the last line of squares makes corners with it, some pixels off. Along a line of corners p0, p1, p2, p3 that begins at the
-//! rim, `p0 - 3 p1 + 3 p2 - p3` is small, however the board is seen.
+//! rim, `w0 p0 - 3 w1 p1 + 3 w2 p2 - w3 p3` is small, however the board is seen: the weights `w = 1 + c (k - 2)` are those of a perspective in which
+//! the last three are in step, as `w1 p1 - 2 w2 p2 + w3 p3` is 0 along the line.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +22,9 @@ pub(super) fn out_of_line(kept: &BTreeMap<(i32, i32), Saddle>) -> Option<(i32, i
     let off = |(u, v): (i32, i32), (du, dv): (i32, i32)| {
         let [p0, p1, p2, p3] = [0, 1, 2, 3].map(|k| at((u + k * du, v + k * dv)));
         let (p0, p1, p2, p3) = (p0?, p1?, p2?, p3?);
-        let third = [0, 1].map(|a| p0[a] - 3.0 * p1[a] + 3.0 * p2[a] - p3[a]);
+        let (along, bend) = ([0, 1].map(|a| p3[a] - p1[a]), [0, 1].map(|a| 2.0 * p2[a] - p1[a] - p3[a]));
+        let c = (bend[0] * along[0] + bend[1] * along[1]) / (along[0].powi(2) + along[1].powi(2));
+        let third = [0, 1].map(|a| (1.0 - 2.0 * c) * p0[a] - 3.0 * (1.0 - c) * p1[a] + 3.0 * p2[a] - (1.0 + c) * p3[a]);
         Some((third[0].hypot(third[1]), (p2[0] - p1[0]).hypot(p2[1] - p1[1])))
     };
     let all = || kept.keys().flat_map(|&key| directions.map(|direction| (key, direction)));

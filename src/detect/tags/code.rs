@@ -6,7 +6,7 @@ use super::quads::Quad;
 use crate::detect::Picture;
 use crate::geom::PlaneMap;
 use crate::linalg::median_by;
-use crate::series::Tags;
+use crate::series::{TagPrint, Tags};
 
 /// Share of the modules of the border that must be dark.
 const LEAST_BORDER: f64 = 0.9;
@@ -14,6 +14,12 @@ const LEAST_BORDER: f64 = 0.9;
 const ONE_WRONG_IN: usize = 16;
 /// The next best reading must differ in at least this many modules more.
 const MARGIN: u32 = 2;
+/// A square all of whose places within its border are darker than this share of the way from ink to paper has no code, by so many places along
+/// a side.
+const DARK: f32 = 0.25;
+const PLACES: usize = 12;
+/// Width of the narrowest border, as a share of a square.
+const NARROWEST: f64 = 0.13;
 /// A reading counts alone when fewer than one in two to the power of this is one by chance.
 pub const SURE_BITS: f64 = 18.0;
 /// Contrast of light and dark modules, as a part of the light.
@@ -51,6 +57,13 @@ impl Reader {
         let counts = || codes.iter().map(|code| code.count_ones());
         let dark = [counts().min().unwrap_or(0), counts().max().unwrap_or(0)];
         Self { bits, border, codes, dark }
+    }
+
+    /// Of markers as OpenCV prints them.
+    pub fn of_opencv(dictionary: &Dictionary) -> Self {
+        let name = dictionary.name().to_owned();
+        let tags = Tags { dictionary: name, print: TagPrint::Opencv, side_m: 1.0, gap_m: 0.0, first_id: 0 };
+        Self::of(&tags, dictionary)
     }
 
     /// Modules along a side, with the border.
@@ -184,6 +197,19 @@ impl Reader {
         let cells = (0..self.bits).flat_map(|row| (0..self.bits).map(move |column| (row, column)));
         cells.enumerate().fold(0, |code, (k, (row, column))| code | u64::from(at(row, column)) << k)
     }
+}
+
+/// Whether a quadrilateral is one dark square, as those of boards and cloths are: no code of any dictionary is there.
+pub fn is_dark_square(picture: &Picture, quad: &Quad) -> bool {
+    let unit = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let Some(map) = PlaneMap::fit(&unit.into_iter().zip(*quad).collect::<Vec<_>>()) else { return false };
+    let value = |x: f64, y: f64| sample(picture, map.apply([x, y])?);
+    let along = |k: usize| NARROWEST + (1.0 - 2.0 * NARROWEST) * k as f64 / (PLACES - 1) as f64;
+    let within = (0..PLACES * PLACES).filter_map(|k| value(along(k % PLACES), along(k / PLACES)));
+    let [darkest, lightest] = within.fold([f32::MAX, f32::MIN], |[low, high], v| [low.min(v), high.max(v)]);
+    let beside = (0..PLACES).map(along).flat_map(|k| [(k, -0.1), (k, 1.1), (-0.1, k), (1.1, k)]);
+    let paper = median_by(beside.filter_map(|(x, y)| value(x, y)), f32::total_cmp);
+    paper.is_some_and(|paper| lightest - darkest < DARK * (paper - darkest))
 }
 
 /// Corners counter-clockwise from the bottom-left of the print, whose top-left is corner `turn` of the quadrilateral.

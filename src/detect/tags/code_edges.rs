@@ -79,7 +79,7 @@ impl CodeEdge {
             [p[0] + y * off(end), p[1] - x * off(end)]
         });
         let [ink_px, paper_px] = [false, true].map(|light| frame.module_px * self.depth(tag, light) as f64);
-        let side = Side { from, to, ink_px, paper_px };
+        let side = Side { from, to, ink_px, paper_px, sharpness: [0.0; 2] };
         EdgeLine::fit(picture, &side, || self.beside(tag, map, &frame)).ok()
     }
 

@@ -54,6 +54,8 @@ const BLUR_RANGE_PX: (f64, f64) = (0.2, 8.0);
 const MOST_STEPS: usize = 24;
 /// Beside what the next side rounds off, so much of both ends is left out, px: they are not known better.
 pub(super) const ENDS_SPARE_PX: f64 = 1.0;
+/// Cosine of the sharpest angle of two sides.
+const SHARPEST: f64 = 0.99;
 /// A step below this moves no corner visibly, px; and what is good enough where pixels pass in and out of saturation.
 const AT_REST_PX: f64 = 1e-4;
 const NEARLY_AT_REST_PX: f64 = 5e-3;
@@ -100,6 +102,15 @@ pub struct Side {
     /// How far ink and paper reach beside it undisturbed, px.
     pub ink_px: f64,
     pub paper_px: f64,
+    /// Cosines of the angles of ink between it and the next sides, where it begins and where it ends.
+    pub sharpness: [f64; 2],
+}
+
+impl Side {
+    /// How much of either end is left out where the next side is nearer than `clear_px`, px.
+    fn spare(&self, clear_px: f64) -> [f64; 2] {
+        self.sharpness.map(|cosine| clear_px / (1.0 - cosine.clamp(0.0, SHARPEST).powi(2)).sqrt())
+    }
 }
 
 /// A rectangle of paper in the ink beside a side, or of ink in its paper.
@@ -248,11 +259,12 @@ impl EdgeLine {
         length: f64,
         [blur_px, spare_px]: [f64; 2],
     ) -> Result<Vec<Pixel>, &'static str> {
-        let half = length / 2.0 - (2.5 * blur_px + ENDS_SPARE_PX).min(length / 4.0);
         let reach = 3.0 * blur_px + 1.0;
         let room = |px: f64| (reach + spare_px).min((px - CLEAR_OF_BLURS * blur_px).max(0.5 * px).max(1.0));
         let (inner, outer) = (room(side.ink_px), room(side.paper_px));
-        let [low, high] = self.extent(half, reach);
+        let [first, last] = side.spare(2.5 * blur_px + ENDS_SPARE_PX).map(|spare| spare.min(length / 4.0));
+        let [from, to] = [first - length / 2.0, length / 2.0 - last];
+        let [low, high] = self.extent([from, to], reach);
         let last = Vector2::new(picture.width as f64 - 1.0, picture.height as f64 - 1.0);
         if low.min() < 0.0 || high.x > last.x || high.y > last.y {
             return Err("cut by the border");
@@ -266,7 +278,7 @@ impl EdgeLine {
                 let d = Vector2::new(u as f64, v as f64) - self.middle;
                 let (x, y) = (d.dot(&self.along), d.dot(&self.across));
                 let beside = y - self.offset(x);
-                if x.abs() <= half && beside >= -inner && beside <= outer {
+                if (from..=to).contains(&x) && beside >= -inner && beside <= outer {
                     let value = picture.at(u, v);
                     pixels.push(Pixel { x, y, value: f64::from(value), saturated: value >= limit, light: 0.0 });
                 }
@@ -276,8 +288,8 @@ impl EdgeLine {
     }
 
     /// Where the side is, px to both sides of it, least and most in the picture.
-    fn extent(&self, half: f64, reach: f64) -> [Vector2<f64>; 2] {
-        let places = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|part| part * half);
+    fn extent(&self, [from, to]: [f64; 2], reach: f64) -> [Vector2<f64>; 2] {
+        let places = [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| from + part * (to - from));
         let beside = places.map(|x| [-reach, reach].map(|y| (x, self.offset(x) + y)));
         let points = beside.into_iter().flatten().map(|(x, y)| self.middle + self.along * x + self.across * y);
         points

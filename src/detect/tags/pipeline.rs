@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use nalgebra::Vector2;
+
 use super::beside::Printed;
 use super::clipped;
 use super::code::{Reader, SURE_BITS};
@@ -10,7 +12,7 @@ use super::growth::{self, Growth, InPicture, Outlined};
 use super::layout::{Layout, Tagged};
 use super::misfit::Usual;
 use super::quads::{Quad, distance, middle};
-use super::scan::{certain, corners, passes, read_pass, scan};
+use super::scan::{certain, coded, corners, passes, read_pass, scan};
 use super::seen::{MEASURED, contradiction, gap_contradiction, instead};
 use crate::detect::circles::{smoothed, variance_factor};
 use crate::detect::detection::smoothed_notice;
@@ -315,7 +317,8 @@ impl<'a> Board<'a> {
     fn side(&self, corners: &Quad, k: usize) -> Side {
         let module = width(corners, k) / self.reader.side() as f64;
         let (ink_px, paper_px) = (module * self.reader.border() as f64, module * self.gap().min(2.0));
-        Side { from: corners[(k + 1) % 4], to: corners[k], ink_px, paper_px }
+        let sharpness = [(k + 1) % 4, k].map(|corner| sharpness(corners, corner));
+        Side { from: corners[(k + 1) % 4], to: corners[k], ink_px, paper_px, sharpness }
     }
 
     fn print_of(&self, place: usize) -> Printed<'_> {
@@ -373,7 +376,11 @@ impl<'a> Board<'a> {
                     let end = [0, 1].map(|a| near[a] + share * (near[a] - far[a]));
                     // its light is where the ink of the tag is
                     let (from, to) = if near == corners[k] { (end, near) } else { (near, end) };
-                    let square = EdgeLine::fit(self.picture, &Side { from, to, ink_px: px, paper_px: px }, Vec::new);
+                    let square = EdgeLine::fit(
+                        self.picture,
+                        &Side { from, to, ink_px: px, paper_px: px, sharpness: [0.0; 2] },
+                        Vec::new,
+                    );
                     grown.extend(square.map(|square| -0.5 * side.step_to(&square)));
                 }
             }
@@ -390,7 +397,7 @@ impl<'a> Board<'a> {
 
     /// What is in the picture, where the plate is not.
     fn why_nothing(&self) -> Error {
-        let quads: Vec<Vec<Quad>> = passes(self.picture).collect();
+        let quads = coded(self.picture);
         let reflected = scan(self.picture, &self.reader, &quads, true);
         if !certain(&self.reader, &reflected, SURE_BITS).is_empty() {
             return mirrored("the tags are mirrored");
@@ -437,6 +444,12 @@ fn width(corners: &Quad, k: usize) -> f64 {
     let along = [to[0] - from[0], to[1] - from[1]];
     let across = |p: [f64; 2]| along[0] * (p[1] - from[1]) - along[1] * (p[0] - from[0]);
     (across(far) + across(last)).abs() / (2.0 * distance(from, to))
+}
+
+/// Cosine of the angle at a corner of a tag.
+fn sharpness(corners: &Quad, k: usize) -> f64 {
+    let [at, next, last] = [0, 1, 3].map(|i| Vector2::from(corners[(k + i) % 4]));
+    (next - at).normalize().dot(&(last - at).normalize())
 }
 
 fn drop_tag(found: &mut Found, place: usize, dropped: &mut Vec<Dropped>) {

@@ -32,7 +32,8 @@ pub fn quads(inverted: &Picture, largest_px: f64, threshold: f32) -> Vec<Quad> {
 fn quad(contour: &Contour) -> Option<Quad> {
     let points: Vec<[f64; 2]> = contour.points.iter().map(|p| p.map(f64::from)).collect();
     let first = clockwise(corners(&points)?);
-    let lines: Vec<Line> = (0..4).map(|k| Line::along(&points, first[k], first[(k + 1) % 4])).collect::<Option<_>>()?;
+    let rough = [0, 1, 2, 3].map(|k: usize| Line::through(first[k], first[(k + 1) % 4]));
+    let lines: Vec<Line> = (0..4).map(|k| Line::along(&points, &first, k, &rough)).collect::<Option<_>>()?;
     let quad: Quad = [0, 1, 2, 3].map(|k: usize| lines[(k + 3) % 4].meets(&lines[k]).unwrap_or([f64::NAN; 2]));
     let sides = [0, 1, 2, 3].map(|k: usize| distance(quad[k], quad[(k + 1) % 4]));
     let shortest = sides.iter().fold(f64::MAX, |m, s| m.min(*s));
@@ -64,14 +65,23 @@ struct Line {
 }
 
 impl Line {
-    /// Total least squares over the points near the middle part of a side.
-    fn along(points: &[[f64; 2]], from: [f64; 2], to: [f64; 2]) -> Option<Self> {
+    fn through(from: [f64; 2], to: [f64; 2]) -> Self {
+        let length = distance(from, to);
+        let normal = [(from[1] - to[1]) / length, (to[0] - from[0]) / length];
+        Self { normal, offset: normal[0] * from[0] + normal[1] * from[1] }
+    }
+
+    /// Total least squares over the points near the middle part of side `k` that are nearer to no other one, as they are where two sides meet
+    /// in a sharp corner.
+    fn along(points: &[[f64; 2]], corners: &Quad, k: usize, rough: &[Self; 4]) -> Option<Self> {
+        let (from, to) = (corners[k], corners[(k + 1) % 4]);
         let length = distance(from, to);
         let t = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
         let near = |p: &&[f64; 2]| {
-            let d = [p[0] - from[0], p[1] - from[1]];
-            let (x, y) = (d[0] * t[0] + d[1] * t[1], d[0] * t[1] - d[1] * t[0]);
-            (ENDS * length..(1.0 - ENDS) * length).contains(&x) && y.abs() < 0.1 * length + 1.5
+            let along = (p[0] - from[0]) * t[0] + (p[1] - from[1]) * t[1];
+            let off = rough[k].distance(**p).abs();
+            let is_middle = (ENDS * length..(1.0 - ENDS) * length).contains(&along);
+            is_middle && off < 0.1 * length + 1.5 && rough.iter().all(|side| side.distance(**p).abs() >= off)
         };
         let near: Vec<&[f64; 2]> = points.iter().filter(near).collect();
         if near.len() < 4 {
@@ -124,4 +134,37 @@ fn clockwise(mut q: Quad) -> Quad {
 
 fn is_convex(q: &Quad) -> bool {
     (0..4).all(|k| cross(q[k], q[(k + 1) % 4], q[(k + 2) % 4]) > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Counts of paper with a dark quadrilateral, of 16 places a pixel.
+    fn picture(ink: &Quad) -> Picture {
+        let (width, height) = (260, 200);
+        let is_ink = |p: [f64; 2]| (0..4).all(|k| cross(ink[k], ink[(k + 1) % 4], p) > 0.0);
+        let value = |k: usize| {
+            let places = (0..16)
+                .map(|i| [(k % width, i % 4), (k / width, i / 4)].map(|(p, i)| p as f64 - 0.375 + i as f64 / 4.0));
+            200.0 - 10.0 * places.filter(|p| is_ink(*p)).count() as f32
+        };
+        Picture { width, height, pixels: (0..width * height).map(value).collect(), full_scale: 255.0 }
+    }
+
+    /// Tags seen slantwise have corners of 25 degrees: points of one side beside it are near the other one, too.
+    #[test]
+    fn a_sharp_corner_is_where_its_sides_meet() {
+        for degrees in [25.0_f64, 40.0, 90.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let corner = |along: f64, up: f64| [40.3 + along * 100.0 + up * 90.0 * cos, 30.6 + up * 90.0 * sin];
+            let ink = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
+            let found = quads(&inverted(&picture(&ink)), 220.0, 0.6);
+            let [quad] = &found[..] else { panic!("{degrees}: {found:?}") };
+            for at in ink {
+                let off = quad.iter().map(|p| distance(*p, at)).fold(f64::MAX, f64::min);
+                assert!(off < 1.0 / sin, "{degrees}: {off} px");
+            }
+        }
+    }
 }

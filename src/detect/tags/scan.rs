@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use calib_targets_aruco::{Dictionary, builtins};
 
-use super::code::{Reader, Reading};
+use super::code::{Reader, Reading, is_dark_square};
 use super::layout::{Layout, Tagged};
 use super::quads::{Quad, distance, inverted, middle, quads};
 use crate::detect::Picture;
@@ -40,6 +40,12 @@ pub fn passes(picture: &Picture) -> impl Iterator<Item = Vec<Quad>> {
     let longer = picture.width.max(picture.height) as f64;
     let inverted = inverted(picture);
     PASSES.into_iter().map(move |(share, threshold)| quads(&inverted, share * longer, threshold))
+}
+
+/// Those that may be tags, whatever their dictionary.
+pub fn coded(picture: &Picture) -> Vec<Vec<Quad>> {
+    let is_coded = |quad: &Quad| !is_dark_square(picture, quad);
+    passes(picture).map(|quads| quads.into_iter().filter(is_coded).collect()).collect()
 }
 
 /// Adds what the quadrilaterals of a pass say; of two that say the same none is known to be right. Numbers that are seen in two places.
@@ -91,4 +97,52 @@ pub fn certain(reader: &Reader, found: &BTreeMap<u32, Reading>, bits: f64) -> Ta
 
 pub fn corners(readings: &BTreeMap<u32, Reading>) -> Tagged {
     readings.iter().map(|(id, reading)| (*id, reading.corners)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIDE_PX: usize = 24;
+
+    /// A square of ink on paper but for the light modules, smoothed over `blur` px, with its corners.
+    fn picture(modules: usize, is_light: impl Fn(usize, usize) -> bool, blur: i32) -> (Picture, Quad) {
+        let size = 2 * SIDE_PX;
+        let first = SIDE_PX / 2;
+        let ink = |x: i32, y: i32| {
+            let [column, row] = [x, y].map(|p| (p - first as i32) * modules as i32);
+            let inside = [column, row].iter().all(|p| (0..(SIDE_PX * modules) as i32).contains(p));
+            inside && !is_light(row as usize / SIDE_PX, column as usize / SIDE_PX)
+        };
+        let value = |k: usize| {
+            let (x, y) = ((k % size) as i32, (k / size) as i32);
+            let around = (-blur..=blur).flat_map(|j| (-blur..=blur).map(move |i| (x + i, y + j)));
+            let dark = around.filter(|(x, y)| ink(*x, *y)).count() as f32 / ((2 * blur + 1) * (2 * blur + 1)) as f32;
+            200.0 - 160.0 * dark
+        };
+        let pixels = (0..size * size).map(value).collect();
+        let [low, high] = [first as f64 - 0.5, (first + SIDE_PX) as f64 - 0.5];
+        let quad = [[low, low], [high, low], [high, high], [low, high]];
+        (Picture { width: size, height: size, pixels, full_scale: 255.0 }, quad)
+    }
+
+    #[test]
+    fn a_dark_square_is_no_tag_and_no_tag_is_one() {
+        for blur in [0, 1] {
+            let (square, quad) = picture(1, |_, _| false, blur);
+            assert!(is_dark_square(&square, &quad), "{blur}");
+            for dictionary in all_dictionaries() {
+                let reader = Reader::of_opencv(&dictionary);
+                let bits = dictionary.marker_size();
+                let light = |id: u32| (0..bits * bits).filter(|k| reader.is_light(id, k / bits, k % bits)).count();
+                let darkest = (0..reader.count() as u32).min_by_key(|id| light(*id)).unwrap();
+                let is_light = |row: usize, column: usize| {
+                    let is_code = [row, column].iter().all(|k| (1..=bits).contains(k));
+                    is_code && reader.is_light(darkest, row - 1, column - 1)
+                };
+                let (tag, quad) = picture(reader.side(), is_light, blur);
+                assert!(!is_dark_square(&tag, &quad), "{} {darkest} {blur}", dictionary.name());
+            }
+        }
+    }
 }
