@@ -207,6 +207,33 @@ fn stops_of_one_name_in_two_series_are_told_apart() {
     assert_eq!(found(&solution, Code::MeasurementsLeftOut).unwrap().subjects(), named);
 }
 
+/// Any change of the readings fits what is measured at two stops again and again.
+#[test]
+fn two_stops_that_are_measured_again_and_again_name_no_mistake() {
+    let mistakes = [
+        Code::JointUnitWrong,
+        Code::JointOrderWrong,
+        Code::JointSignWrong,
+        Code::ZeroOff,
+        Code::RowsShifted,
+        Code::AxesMirrored,
+    ];
+    for seed in 1..5 {
+        let mut dice = Dice::new(seed);
+        let truth = truth(&mut dice, &chain());
+        let two = [readings(&mut dice), readings(&mut dice)];
+        let mut k = 0;
+        let world = World::taken(dice, truth, Kind::Points, 20, (5e-5, 0.0), 2e-5, |dice| {
+            k += 1;
+            (two[k % 2].clone(), (0..6).map(|_| dice.normal(2e-5)).collect())
+        });
+        match identified(&world, world.series.clone()) {
+            Err(refusal) => assert!(!mistakes.contains(&refusal.code), "{seed}: {refusal}"),
+            Ok(solution) => assert!(found(&solution, Code::FewImages).is_some(), "{seed}: {:?}", solution.findings),
+        }
+    }
+}
+
 /// A ball in so many sockets by turns, of which these are elsewhere from a stop on.
 fn by_turns(seed: u64, sockets: usize, moved: &[usize], from: usize, shift: Vector3<f64>) -> World {
     touched((seed, sockets), |k| k % sockets, moved, from, shift)
