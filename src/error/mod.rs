@@ -170,6 +170,9 @@ impl fmt::Display for Notice {
     }
 }
 
+/// Characters of a name that cannot be printed which are shown.
+const MOST_SHOWN: usize = 40;
+
 /// Characters that change a terminal or end a line of a program: control characters, line and paragraph separators, changes of direction.
 fn is_hidden(c: char) -> bool {
     c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
@@ -184,8 +187,14 @@ pub fn plain_name<'a>(kind: &str, name: &'a str, place: impl fmt::Display) -> Re
         return Ok(name);
     }
     let article = if kind.starts_with(['a', 'e', 'i', 'o']) { "an" } else { "a" };
-    let what = format!("the name of {article} {kind} has control characters: \"{}\"", name.escape_debug());
-    Err(Error::new(Code::NameUnprintable, place, what, "give it a name of letters, digits, - and _"))
+    let escaped = name.chars().take(MOST_SHOWN).flat_map(char::escape_debug).collect::<String>();
+    let more = if name.chars().nth(MOST_SHOWN).is_some() { " .." } else { "" };
+    let what = format!("the name of {article} {kind} has control characters: \"{escaped}\"{more}");
+    let remedy = match name.contains('\0') {
+        true => "the file is damaged (zeros stand where text should be), or no text in UTF-8: take a good copy of it",
+        false => "give it a name of letters, digits, - and _",
+    };
+    Err(Error::new(Code::NameUnprintable, place, what, remedy))
 }
 
 /// Text of files for the terminal: what cannot be seen is escaped, line ends and tabs stay.
@@ -314,6 +323,11 @@ mod tests {
             assert_eq!((error.exit_code(), error.place.as_str()), (2, "robot.urdf:3"));
             assert!(!error.what.contains(bad) && error.what.is_ascii(), "{}", error.what);
         }
+        let zeros = plain_name("column", &"\0".repeat(5000), "joints.csv:1").unwrap_err();
+        assert!(
+            zeros.what.len() < 200 && zeros.remedy != plain_name("column", "a\n", "x").unwrap_err().remedy,
+            "{zeros}"
+        );
         for good in ["joint_a1", "Gelenk 1", "schön", "a;b\"c"] {
             assert_eq!(plain_name("joint", good, "x"), Ok(good));
         }

@@ -91,6 +91,8 @@ fn what_routines_of_krl_change_by_reference_is_not_corrected() {
         ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE\nPTP XP1", None),
         ("FIND(F1)\n$BASE=F1\nPTP XP1\nEND\nDEF FIND(F)\nF.X=9", frame),
         ("FIND($BASE)\nPTP XP1", frame),
+        ("$BASE=$WORLD\nPTP XP1", None),
+        ("$BASE=$WORLDS\nPTP XP1", frame),
     ] {
         let files = [("a.src", text(body)), ("a.dat", dat.clone())];
         let (_, reasons) = told(&cell, &files, &[]);

@@ -49,6 +49,7 @@ fn alone(args: &VerifyArgs, inputs: Inputs) -> Result<Verdict> {
     require_readings(&inputs)?;
     let model = model(args, inputs.chain.clone())?;
     let Observed { series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
+    require_images(&series)?;
     let zeros = zeros(args, &model, &files)?;
     let series = with_added(series, &missing(zeros.as_ref()));
     let seen = Verified { series: &series, files: &files, zeros: zeros.as_ref() };
@@ -64,6 +65,7 @@ fn alone(args: &VerifyArgs, inputs: Inputs) -> Result<Verdict> {
 /// The model and the nominal one, by the images that both predict.
 fn beside_nominal(args: &VerifyArgs, model: &Model, (file, inputs): (&Path, Inputs)) -> Result<Verdict> {
     let Observed { chain, series, files, .. } = inputs.observe(&model.limits, &progress::of_series())?;
+    require_images(&series)?;
     let zeros = zeros(args, model, &files)?;
     let missing = missing(zeros.as_ref());
     let series = in_told_postures(&model.robot, &with_added(series, &missing), &model.limits);
@@ -276,6 +278,27 @@ fn require_readings(inputs: &Inputs) -> Result<()> {
         let remedy = "give --nominal, the robot description that the controller computes with";
         Err(Error::new(Code::OptionMissing, s.readings_file().display(), what, remedy))
     })
+}
+
+/// Images judge; what trackers and contacts measured beside them is said not to.
+fn require_images(series: &[MeasuredSeries]) -> Result<()> {
+    let measured: Vec<&MeasuredSeries> = series.iter().filter(|s| !s.bodies.is_empty()).collect();
+    let has_images = series.iter().any(|s| s.stops.iter().any(|stop| !stop.observations.is_empty()));
+    let remedy = "give what a tracker measured as --points FILE, a table of joint readings with x_m, y_m, z_m";
+    match measured.first() {
+        Some(first) if !has_images => {
+            let what = "a series is judged by its images, and there is none: trackers or contacts measured it";
+            Err(Error::new(Code::ImagesMissing, format!("series {}", first.name), what, remedy))
+        }
+        Some(_) => {
+            let count: usize = measured.iter().map(|s| s.bodies.len()).sum();
+            say_line!(
+                "left      {count} measurements of trackers and contacts: a series is judged by its images ({remedy})"
+            );
+            Ok(())
+        }
+        None => Ok(()),
+    }
 }
 
 fn require_same_joints(model: &Chain, nominal: &Chain, urdf: &Path, file: &Path) -> Result<()> {

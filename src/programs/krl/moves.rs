@@ -10,6 +10,8 @@ pub(super) const RELATIVE: [&str; 7] =
 
 /// The frame without any displacement.
 pub(super) const NULL_FRAME: &str = "$NULLFRAME";
+/// The system's own frame of the world, in which bases are stated.
+pub(super) const WORLD: &str = "$WORLD";
 
 /// True before `$NULLFRAME:`, behind which stands a position as it is.
 pub(super) fn is_seen_from_null(reader: &Reader<'_>) -> bool {

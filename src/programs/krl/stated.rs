@@ -2,7 +2,7 @@
 
 use super::aggregate::Aggregate;
 use super::frames::{FrameIs, Frames, IpoMode, OwnFrames};
-use super::moves::NULL_FRAME;
+use super::moves::{NULL_FRAME, WORLD};
 use super::{Module, Value};
 use crate::geom::Pose;
 use crate::programs::reason::LeftReason;
@@ -11,7 +11,7 @@ use crate::programs::scan::Reader;
 impl Module<'_> {
     pub(super) fn frame(&self, value: &Value) -> FrameIs {
         if let Value::Name(name) = value
-            && name == NULL_FRAME
+            && [NULL_FRAME, WORLD].contains(&name.as_str())
         {
             return FrameIs::Known(Pose::identity());
         }
