@@ -48,6 +48,26 @@ fn a_larger_robot_of_the_same_build_is_named() {
     assert!(angle < 0.01 && (0.03..0.4).contains(&distance), "{angle} rad, {distance} m");
 }
 
+#[test]
+fn stops_that_were_taken_again_and_again_are_counted_once() {
+    let chain = kr6();
+    let good = seen(&chain);
+    let again = |different: usize| {
+        let stop = |row: usize| MeasuredStop {
+            row,
+            image: format!("again_{row:03}.png"),
+            ..good.stops[row % different].clone()
+        };
+        let series = MeasuredSeries { stops: (0..24).map(stop).collect(), ..good.clone() };
+        identify(chain.clone(), &[series], &Options::default())
+    };
+    assert_eq!(again(4).map(|_| ()).unwrap_err().code, Code::ImagesTooFew);
+    let few = again(8).unwrap();
+    let found = few.findings.iter().find(|f| f.code() == Code::FewImages).unwrap();
+    let count = |name: &str| found.quantities().into_iter().find(|q| q.name == name).unwrap().value;
+    assert_eq!([count("images"), count("different")], [24.0, 8.0]);
+}
+
 /// They turn nothing, and look like other link lengths.
 #[test]
 fn zeros_of_parallel_joints_that_cancel_are_found() {

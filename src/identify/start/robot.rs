@@ -20,7 +20,8 @@ use crate::linalg::{dense, median};
 use crate::model::one_direction::turns_about_one_direction;
 use crate::model::robot::Robot;
 use crate::problem::{
-    Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, predict,
+    Adjustment, ImageRejection, MeasuredSeries, Misfit, Mismatch, Problem, State, TakenFrom, different_readings,
+    predict,
 };
 use crate::solve::{Covariance, Outcome};
 use crate::urdf::BASE_FROM_BASE;
@@ -177,6 +178,29 @@ fn require_enough(images: usize, of: &str, limits: &Limits) -> Result<()> {
     Err(Error::new(Code::ImagesTooFew, of, what, remedy))
 }
 
+/// Refuses images of a few stops that were taken again and again, by readings and camera poses: anything fits them.
+fn require_different(problem: &Problem, pairs: &[(usize, PosePair)], of: &str, limits: &Limits) -> Result<()> {
+    let fewest = limits.hand_eye_images;
+    let Some((_, PosePair { camera_from_plate: first, .. })) = pairs.first() else { return Ok(()) };
+    let seen = pairs.iter().map(|(_, PosePair { camera_from_plate: pose, .. })| {
+        let turned = log_so3(&(first.rotation.transpose() * pose.rotation));
+        [pose.translation.as_slice(), turned.as_slice()].concat()
+    });
+    let seen: Vec<Vec<f64>> = seen.collect();
+    let read = pairs.iter().filter_map(|(i, _)| problem.posture(*i).map(|posture| posture.readings.as_slice()));
+    let different = different_readings(seen.iter().map(Vec::as_slice), limits.suspicious_misfit, fewest)
+        .max(different_readings(read, limits.joint_noise, fewest));
+    if different >= fewest {
+        return Ok(());
+    }
+    let what = format!(
+        "the {} images of the robot are of {different} different stops only, at least {fewest} are needed and some 30 to 50 wanted",
+        pairs.len()
+    );
+    let remedy = "move every joint between the images, and tilt the camera to all sides";
+    Err(Error::new(Code::ImagesTooFew, of, what, remedy))
+}
+
 fn closed_form(
     Adjustment { problem, state }: &Adjustment,
     pairs: &[(usize, PosePair)],
@@ -188,6 +212,7 @@ fn closed_form(
 ) -> Result<HandEye> {
     require_enough(pairs.len(), of, limits)?;
     check_rotations(of, poses, &state.robot, limits)?;
+    require_different(problem, pairs, of, limits)?;
     let starts = solve_hand_eye(poses);
     let cost = |s: &HandEyeStart| {
         let mut trial = state.clone();

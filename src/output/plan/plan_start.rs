@@ -59,7 +59,10 @@ pub fn from_solution(record: &SolutionRecord, chain: Chain, model: RobotModel) -
         return Err(refuse(what, "leave out --urdf, --base and --tip, or give those with which it was made"));
     }
     let first = record.images.iter().find(|i| i.is_used_on_robot()).ok_or_else(|| {
-        refuse("has no image on the robot in use".into(), "plan from --plate-pose and --hand-camera instead")
+        refuse(
+            "has no image on the robot in use".into(),
+            "plan without it: give --urdf with the corrected robot, --plate, --plate-pose and --hand-camera",
+        )
     })?;
     let used: Vec<&ImageRecord> =
         record.images.iter().filter(|i| i.is_used_on_robot() && i.plate == first.plate).collect();
