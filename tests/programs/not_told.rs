@@ -338,7 +338,7 @@ fn poses_behind_branches_that_set_tool_frame_or_displacement_differently_are_lef
         ("IF $IN[1] THEN\nSET\nELSE\nMOVE\nENDIF", vec![]),
         ("SWITCH N\nCASE 1\nSET\nCASE 2\nSET\nDEFAULT\nSET\nENDSWITCH\nMOVE", vec![]),
         ("SWITCH N\nCASE 1\nSET\nCASE 2\nSET\nENDSWITCH\nMOVE", vec![tool]),
-        ("FOR I=1 TO 3\n$BASE=$WORLD\nENDFOR\nMOVE", vec![work]),
+        ("FOR I=1 TO 3\n$BASE=$ELSEWHERE\nENDFOR\nMOVE", vec![work]),
         ("REPEAT\nSET\nUNTIL $IN[1]\nMOVE", vec![]),
     ] {
         let left: Vec<String> = left.into_iter().map(str::to_owned).collect();
