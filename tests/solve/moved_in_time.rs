@@ -338,7 +338,7 @@ fn what_breaks_a_series_is_named() {
         assert_named(&moved(&|pose| pose * pushed), Code::PlateMoved, &[first]);
         assert_named(&moved(&|pose| pushed * pose), Code::CameraMoved, &[first]);
         // Hardly turned: directions fit, and distances do not, as with other links.
-        let slid = Pose::exp(&Vector6::new(0.08, 0.06, 0.0, 0.0, 0.0, 5e-3));
+        let slid = Pose::exp(&Vector6::new(0.06, 0.03, 0.0, 0.0, 0.0, 5e-3));
         assert_named(&moved(&|pose| pose * slid), Code::PlateMoved, &[first]);
     }
     for from in [7, 18] {
