@@ -26,8 +26,9 @@ pub struct CamerasContradict {
 
 pub(super) fn check(fit: &Fit, _: &Accuracy, setting: &CheckContext) -> Vec<CamerasContradict> {
     let fit = setting.with_noise_found(fit);
+    let shifts_m = fit.problem.apparent_shifts_m();
     let of_series = |k: usize| {
-        let apart_m = fit.problem.noise.apparent_shift_m(fit.problem.noise_of(k))?;
+        let apart_m = shifts_m.get(fit.problem.noise_of(k)).copied().flatten()?;
         let weight = weight(apart_m, setting.limits)?;
         Some(CamerasContradict { series: of_same_noise(fit, setting, k), cameras: cameras(fit, k), apart_m, weight })
     };

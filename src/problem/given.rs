@@ -148,6 +148,19 @@ impl Problem {
         shared.into_iter().map(|stops| stops >= LEAST_SHARED_STOPS).collect()
     }
 
+    /// Apparent shift of the plate in the images of every series, by the index of its noise, across the optical axis and along it, m; none where
+    /// its stops do not tell it, whatever others tell of theirs.
+    pub fn apparent_shifts_m(&self) -> Vec<Option<[f64; 2]>> {
+        let sizes = self.noise.displacement_sizes();
+        let told = self.tells_displacements().into_iter().enumerate();
+        let of =
+            |(series, is_told): (usize, bool)| match *self.noise.displacement.get(series * sizes..)?.get(..sizes)? {
+                [_, _, across, along] if is_told => Some([across, along]),
+                _ => None,
+            };
+        told.map(of).collect()
+    }
+
     /// Tie of every image to its readings: rigid, or displaced by nothing where apparent displacements have a size.
     pub fn upright_ties(&self) -> Vec<Tie> {
         if self.noise.displacement.is_empty() {

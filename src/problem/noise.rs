@@ -26,13 +26,6 @@ impl Noise {
         self.displacement.len() / self.joint.len().max(1)
     }
 
-    /// Apparent shift of the plate in the images of a series across the optical axis and along it, m; none where no cameras share stops.
-    pub fn apparent_shift_m(&self, series: usize) -> Option<[f64; 2]> {
-        let sizes = self.displacement_sizes();
-        let own = self.displacement.get(series * sizes..(series + 1) * sizes)?;
-        if let [_, _, across, along] = *own { Some([across, along]) } else { None }
-    }
-
     /// The sizes of apparent displacements that are of one kind, series by series.
     pub fn displacement_groups(&self) -> impl Iterator<Item = Vec<usize>> + use<> {
         let (sizes, all) = (self.displacement_sizes(), self.displacement.len());

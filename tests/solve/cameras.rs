@@ -2,6 +2,7 @@
 
 use nalgebra::{DVector, Vector3};
 use robotcal::Code;
+use robotcal::diagnose::Subject;
 use robotcal::geom::{Pose, exp_so3};
 use robotcal::identify::{JointNoise, Options, Selection, Solution, identify};
 use robotcal::model::camera::{Camera, Lens};
@@ -316,6 +317,26 @@ fn cameras_that_contradict_each_other_are_named() {
     assert_eq!(told(3.5e-4, 5e-5), Some((false, 4)));
     assert_eq!(told(1.5e-3, 5e-5), Some((true, 4)));
     assert_eq!(told(2e-5, 3e-3), Some((true, 4)));
+}
+
+/// A series of one camera beside them has their sizes, and no stop that tells it.
+#[test]
+fn a_camera_that_shares_no_stop_contradicts_none() {
+    let mut seen = seen_displaced(&[CameraMount::Hand; 2], 30, 3, [1e-5, 1e-5, 1.5e-3, 5e-5]);
+    let alone = seen_displaced(&[CameraMount::Hand], 20, 4, [0.0; 4]).series.remove(0);
+    seen.series.push(MeasuredSeries {
+        run: Some("alone".into()),
+        name: "alone".into(),
+        camera: "own".into(),
+        mounting: "own".into(),
+        ..alone
+    });
+    let solution = solved(&seen);
+    let found = solution.findings.iter().filter(|f| f.code() == Code::CamerasContradict);
+    let found: Vec<_> = found.map(|f| (f.fails(), f.subjects())).collect();
+    let series = ["run cam0", "run cam1"].map(|name| Subject::Series(name.into()));
+    let cameras = ["cam0", "cam1"].map(|name| Subject::Camera(name.into()));
+    assert_eq!(found, [(true, [series, cameras].concat())]);
 }
 
 /// Mean of the squared normalised errors over many worlds, with its 99 % interval, for every mixture of two cameras.
