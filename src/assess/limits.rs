@@ -107,7 +107,8 @@ limits! {
     point_sigmas: f64 = 4.79;
     /// The same of a measured pose.
     pose_sigmas: f64 = 5.52;
-    /// Images of the robot below which the prior decides much of the result: a 6R arm has some 30 parameters, six rows an image.
+    /// Images of the robot, and different readings, below which the prior decides much of the result: a 6R arm has some 30 parameters, six rows an
+    /// image.
     few_images: usize = 20;
     /// Share of the robot's images left out from which a result asks for a look.
     doubtful_share_left_out: f64 = 0.1;
@@ -220,7 +221,8 @@ limits! {
     /// Prior sigmas of the x/y scale beyond which a plate was not made to size.
     plate_aspect_sigmas: f64 = 5.0;
 
-    /// Fewest images of the robot in a group with a hand-eye transform and target pose of its own: two more than the closed form needs.
+    /// Fewest images of the robot in a group with a hand-eye transform and target pose of its own: two more than the closed form needs. So many
+    /// of their stops must be different ones; by fewer a tracker names no mistake, either.
     hand_eye_images: usize = 5;
     /// Smallest rotation between stops about a second axis, rad, RMS: below, the closed form has no unique answer in noise.
     hand_eye_rotation_rad: f64 = 0.05;

@@ -98,13 +98,11 @@ fn weight(
     limits: &Limits,
 ) -> Option<Weight> {
     let is_unusual = sigma >= limits.unusual_joint_noise;
-    match () {
-        () if sigma > limits.joint_noise => Some(Weight::Gate),
-        // Then they are not those that the robot had.
-        () if is_unusual && is_of_computed => Some(Weight::Gate),
-        () if (is_unusual || is_quieter_elsewhere) && told() => Some(Weight::Note),
-        () => None,
+    // Computed readings with that much are not those that the robot had.
+    if sigma > limits.joint_noise || is_unusual && is_of_computed {
+        return Some(Weight::Gate);
     }
+    ((is_unusual || is_quieter_elsewhere) && told()).then_some(Weight::Note)
 }
 
 /// The other series of the robot with the least noise of a reading, where this one is far noisier.

@@ -18,7 +18,7 @@ const MARGIN: u32 = 2;
 /// a side.
 const DARK: f32 = 0.25;
 const PLACES: usize = 12;
-/// Width of the narrowest border, as a share of a square.
+/// From where on within a square it is looked at, as a share of it: about where the narrowest borders end.
 const NARROWEST: f64 = 0.13;
 /// A reading counts alone when fewer than one in two to the power of this is one by chance.
 pub const SURE_BITS: f64 = 18.0;

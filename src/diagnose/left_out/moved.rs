@@ -74,9 +74,7 @@ impl BodyMoved {
         let by_turns = stand_between(problem, &images, limits.place_changes);
         Some(Self { moved: found.moved, between, images: images.into_iter().map(name).collect(), by_turns })
     }
-}
 
-impl BodyMoved {
     fn images_in_words(&self) -> String {
         let (count, end) = (self.images.len(), |image: Option<&String>| image.cloned().unwrap_or_default());
         match self.by_turns {
